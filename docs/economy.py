@@ -48,7 +48,7 @@ steps, and for how long.
 ## By which way
 
 Pairs that overlap or touch in a step, on average over all steps, by the
-[way](how.md#which-bodies-are-measured-by-which-way) in which the answer came.
+[way](how.md#which-method-measures-which-bodies) in which the answer came.
 
 {ways}
 

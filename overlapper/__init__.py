@@ -66,8 +66,8 @@ overlap = _introspectable(overlap)
 overlaps = _introspectable(overlaps)
 penetration_depth = _introspectable(penetration_depth)
 
-# These names are imported when they are asked for. The pytest plugin is a module of this package, so an import of numpy
-# here would delay every start of pytest. Names that need more than numpy are not imported by * either.
+# These names are imported on first access. The pytest plugin is a module of this package, so an import of numpy here
+# would delay every start of pytest. An import by * leaves out names that need more than numpy.
 __getattr__ = _lazily(
     __name__,
     {

@@ -1,4 +1,4 @@
-"""Results as a table of pyarrow, pandas or polars: columns with their units, a row per pair."""
+"""Results as a table of pyarrow, pandas or polars: columns with units in their names, one row per pair."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import polars
     import pyarrow
 
-# The measures of a pair, by their attribute of `Overlap`, `Overlaps` and `LinkContact`, each with its columns. The unit
-# is in the name of a column. A pair that only touches has no centroid, and `normal` points from B to A.
+# The measures of a pair, by the attribute of `Overlap`, `Overlaps` and `LinkContact`, each with its columns. The unit
+# is in the name of a column. A pair that only touches has no centroid. `normal` points from B to A.
 MEASURES = {
     "volume": ["volume_m3"],
     "volume_error": ["volume_error_m3"],
@@ -40,13 +40,13 @@ FORCE_MEASURES = {
 
 MEASURE_COLUMNS, FORCE_COLUMNS = ([*chain.from_iterable(each.values())] for each in (MEASURES, FORCE_MEASURES))
 
-MOST_ROWS = 20  # that a notebook shows
+MOST_ROWS = 20  # the most rows that a notebook shows
 
 Columns = dict[str, NDArray[Any] | Sequence[Any]]
 
 
 def measures_of(pair: object) -> dict[str, float | None]:
-    """The values of MEASURE_COLUMNS of an Overlap or a LinkContact; None where it has no such measure."""
+    """The values of MEASURE_COLUMNS of an Overlap or a LinkContact; None for a measure that it does not have."""
     row: dict[str, float | None] = dict.fromkeys(MEASURE_COLUMNS)
     for name, columns in MEASURES.items():
         value = getattr(pair, name, None)
@@ -56,13 +56,13 @@ def measures_of(pair: object) -> dict[str, float | None]:
 
 
 class Tabular(ABC):
-    """Rows with named columns. A missing number is null; in pandas, it is not a number."""
+    """Rows with named columns. A missing number is null; in pandas, it is NaN."""
 
     __slots__ = ()
 
     @abstractmethod
     def columns(self) -> Columns:
-        """The columns by name, all of one length; a missing number is NaN."""
+        """The columns by name, all of the same length. A missing number is NaN."""
 
     def to_arrow(self) -> pyarrow.Table:
         """A pyarrow.Table, columns as those of `overlapper run`. ImportError without pyarrow."""

@@ -1,4 +1,4 @@
-"""Packages that import what they offer when it is asked for."""
+"""Packages that import the names that they offer on first access."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from importlib import import_module
 def lazily(package: str, offers: Mapping[str, tuple[str, ...]], needs: str | None = None) -> Callable[[str], object]:
     """The `__getattr__` of a package (PEP 562) that offers names of its modules.
 
-    `needs` is what an ImportError says of a library that is not installed; without it, the module's own words are kept.
+    `needs` is the text of the ImportError for a library that is not installed. Without it, the module's text is kept.
     """
     homes = {name: module for module, names in offers.items() for name in names}
 

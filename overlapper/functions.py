@@ -1,4 +1,4 @@
-"""Functions of the core as inspect, pydoc and pickle expect functions: with a signature, a docstring and a name."""
+"""Gives functions of the core what inspect, pydoc and pickle expect: a signature, a docstring and a name."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def introspectable(of_core: F) -> F:
 
 
 def signature(core: Any) -> inspect.Signature:
-    """That of the last overload, with types as text."""
-    import inspect  # only where it is asked for: it would add a quarter to the import of the package
+    """The signature of the last overload, with types as text."""
+    import inspect  # only on use: it would add a quarter to the import time of the package
 
     found: dict[str, Any] = {}
     exec(f"from __future__ import annotations\n{core.__nb_signature__[-1][0]}: ...", found)

@@ -1,4 +1,4 @@
-"""The library to install where one is missing. It is told by its own name, as this package may be on no index."""
+"""Hints on missing libraries. They name the library and not an extra, because this package may be on no index."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sysconfig
 
 
 def hint(*packages: str) -> str:
-    """The packages, and the command that installs them: the end of a sentence of what needs them."""
+    """The packages, and the command that installs them, as the end of a sentence about the code that needs them."""
     return f"{' and '.join(packages)}: pip install {' '.join(packages)}"
 
 

@@ -1,29 +1,29 @@
-"""Text from outside, made fit for a terminal, for a line of a file and for a label."""
+"""Makes text from outside safe for a terminal, a line of a file and a label."""
 
 from __future__ import annotations
 
-LONGEST = 1_000  # characters of a sentence
+LONGEST = 1_000  # the most characters of a sentence
 
 
 def printable(text: str) -> str:
-    r"""The text with what cannot be seen written as Python escapes it, such as \x1b for the start of a colour."""
+    r"""The text with invisible characters as Python escapes, such as \x1b for the start of a colour."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def first_line(error: object, most: int = LONGEST) -> str:
-    """The first line of what an error says, or what kind of error it is; without a full stop, as part of a sentence.
+    """The first line of the text of an error, or else its type; without a full stop, as part of a sentence.
 
     A line is shortened to about `most` characters.
     """
     try:
         said = str(error).strip()
-    except Exception:  # of the error's own __str__
+    except Exception:  # raised by the error's own __str__
         said = ""
     return printable(shortened((said or type(error).__name__).splitlines()[0].rstrip("."), most))
 
 
 def shortened(text: str, most: int) -> str:
-    """The text, or about `most` characters of its two ends, with the number of those between them."""
+    """The text, or about `most` characters of its two ends, with the number of characters left out between them."""
     half = most // 2
     if len(text) <= most:
         return text
@@ -31,5 +31,5 @@ def shortened(text: str, most: int) -> str:
 
 
 def encodable(text: str) -> str:
-    r"""The text with lone surrogates, which stand for bytes that are no UTF-8, written as \udcff."""
+    r"""The text with lone surrogates written as \udcff. They stand for bytes that are not UTF-8."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")

@@ -1,4 +1,4 @@
-"""Quaternions (x, y, z, w), many at once. Those that turn vectors are unit quaternions."""
+"""Quaternions (x, y, z, w), many at once. Quaternions that rotate vectors must be unit quaternions."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ Array = NDArray[np.float64]
 
 
 def rotated(quaternions: Array, vectors: Array) -> Array:
-    """Vectors (..., 3) turned by unit quaternions (..., 4) xyzw."""
+    """Vectors (..., 3) rotated by unit quaternions (..., 4) xyzw."""
     axis, w = quaternions[..., :3], quaternions[..., 3:]
     twice = 2 * np.cross(axis, vectors)
     return np.asarray(vectors + w * twice + np.cross(axis, twice))
 
 
 def composed(first: Array, second: Array) -> Array:
-    """The products first * second of quaternions (..., 4) xyzw of any length: turn by the second, then by the first."""
+    """The products first * second of quaternions (..., 4) xyzw of any length: rotate by second, then by first."""
     a, b, v, w = first[..., :3], second[..., :3], first[..., 3:], second[..., 3:]
     vector = v * b + w * a + np.cross(a, b)
     return np.concatenate([vector, v * w - (a * b).sum(axis=-1, keepdims=True)], axis=-1)

@@ -17,7 +17,7 @@ Exact = NDArray[np.object_]  # of Fraction
 exact: Any = np.frompyfunc(Fraction, 1, 1)
 integer_root: Any = np.frompyfunc(math.isqrt, 1, 1)
 
-# A sum of a few products of doubles below 1 is right to DOUBT times the sum of their magnitudes, plus UNDERFLOW.
+# The error of a sum of a few products of doubles below 1 is at most DOUBT times the sum of magnitudes, plus UNDERFLOW.
 DOUBT, UNDERFLOW = 2.0**-48, 2.0**-1000
 
 
@@ -36,7 +36,7 @@ def rotation(quaternion: NDArray[np.float64]) -> Exact:
 
 
 def integers(values: Any) -> tuple[Exact, int]:
-    """The values times their least common denominator, and that denominator: sums of integers are much faster."""
+    """The values times their least common denominator, and the denominator. Sums of integers are much faster."""
     values = np.asarray(values, object)
     scale = math.lcm(*(x.denominator for x in values.flat))
     numbers: Exact = np.frompyfunc(lambda x: x.numerator * (scale // x.denominator), 1, 1)(values)
@@ -67,7 +67,7 @@ def triple(u: Exact, v: Exact, w: Exact) -> Exact:
 
 
 def root(square: Fraction) -> tuple[Fraction, Fraction]:
-    """(lower, upper) bounds of the square root: equal if the root is short, else apart by 1e-38 of it or less."""
+    """(lower, upper) bounds of the square root: equal if the root is short, else they differ by 1e-38 of it or less."""
     shift = 128 - (square.numerator.bit_length() - square.denominator.bit_length()) // 2
     scaled = square * (Fraction(4) ** shift)
     floor = math.isqrt(scaled.numerator // scaled.denominator)
@@ -85,7 +85,7 @@ def primitive(row: Iterable[Fraction]) -> tuple[int, ...]:
 
 
 def is_closed(triangles: NDArray[np.signedinteger]) -> bool:
-    """Whether triangles (k, 3) of indices have no border: every directed edge is met by its reverse as often."""
+    """Whether triangles (k, 3) of indices have no border: every directed edge occurs as often as its reverse."""
     edges = Counter((int(t[i - 1]), int(t[i])) for t in triangles for i in range(3))
     return bool(edges) and all(count == edges[end, start] for (start, end), count in edges.items())
 

@@ -1,7 +1,7 @@
-"""FCL's answer for the same shapes and poses, and who is nearer to the truth when it differs from ours.
+"""FCL's answer for the same shapes and poses, and which answer is nearer to the truth if it differs from ours.
 
-FCL (python-fcl) runs in a process of its own. For some pairs that barely touch, its signed distance ends the process,
-by a C++ exception that no `except` in Python can catch.
+FCL (python-fcl) runs in a separate process. For some pairs that barely touch, its signed distance ends the process by a
+C++ exception that no `except` in Python can catch.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ except ImportError:
 # For each of the two bodies its model and its pose: quaternion wxyz, position.
 Request = tuple[tuple[FclModel, tuple[Any, Any]], ...]
 
-# FCL's default distance_tolerance, in m, which python-fcl cannot change. EPA stops when its bounds of the depth are
-# this near. The distance search stops when a step gains less than this, which promises nothing: beside curved shapes it
-# has been seen to end 2e-4 m too far, and such pairs are disagreements, to be settled exactly.
+# FCL's default distance_tolerance, in m, which python-fcl cannot change. EPA stops when its bounds of the depth differ
+# by less. The distance search stops when a step gains less, which does not bound its error. Beside curved shapes, its
+# result has been 2e-4 m too large. Such pairs are disagreements and are settled exactly.
 FCL_TOLERANCE = 1e-6
 
-# The exact value is sought to this fraction of what the two sides differ by: enough to say who is nearer, and to print.
+# The exact value is computed to this fraction of the difference of the two sides. This suffices to say which is nearer.
 RESOLUTION = 1e-3
 
 # The message of FCL before it aborts, or of Python.
@@ -45,7 +45,7 @@ CAUSE = r"Original error message: .*?\): (.*)|^(\w*(?:Error|Exception): .*)"
 class Figures:
     """One side's answer for a pair.
 
-    `signed_distance` is in m: the distance when apart, minus the depth when overlapping, None where FCL gives none.
+    `signed_distance` is in m: the distance if separated, minus the depth if overlapping; None if FCL gives no value.
     """
 
     overlapping: bool
@@ -60,9 +60,9 @@ class Figures:
 class Comparison:
     """FCL's answer for a pair, beside ours.
 
-    `fcl` is None where FCL gave nothing at all. `exact` = (lower, upper), in m, holds the exact signed distance; it is
-    worked out unless the two sides agree at once. `nearer` is the winner of a disagreement, None if `exact` cannot
-    tell. `explanation` is one sentence.
+    `fcl` is None if FCL gave no answer. `exact` = (lower, upper), in m, bounds the exact signed distance. It is
+    computed unless the two sides agree at once. `nearer` is the side nearer to the exact value in a disagreement; None
+    if `exact` does not decide. `explanation` is one sentence.
     """
 
     verdict: Literal["agree", "disagree", "crashed", "unsupported"]
@@ -74,10 +74,10 @@ class Comparison:
 
 
 class Fcl:
-    """python-fcl as a referee of overlaps: a context manager that keeps the process in which FCL runs.
+    """Checks overlaps with python-fcl: a context manager that keeps the process in which FCL runs.
 
-    A pair that ends the process, or takes it longer than `time_limit` seconds, gets the verdict "crashed", and the
-    process is started again for the next one. ImportError without python-fcl.
+    A pair that ends the process, or takes longer than `time_limit` seconds, gets the verdict "crashed". The process is
+    then started again for the next pair. ImportError without python-fcl.
     """
 
     def __init__(self, time_limit: float = 10.0) -> None:
@@ -101,11 +101,11 @@ class Fcl:
             self._worker = None
 
     def compare(self, overlap: Overlap) -> Comparison:
-        """Asks FCL about the two shapes of `overlap`, as they were placed."""
+        """Asks FCL about the two shapes of `overlap`, in the same poses."""
         return self.compare_many([overlap])[0]
 
     def compare_many(self, overlaps: Iterable[Overlap]) -> list[Comparison]:
-        """As `compare`, in one exchange with the process; a pair that ends it costs no other pair its answer."""
+        """As `compare`, for many pairs in one exchange with the process. If a pair ends it, other pairs get answers."""
         overlaps = list(overlaps)
         reasons = [_unsupported(overlap) for overlap in overlaps]
         answers = iter(self._ask([_request(overlap) for overlap, reason in zip(overlaps, reasons) if not reason]))
@@ -115,7 +115,7 @@ class Fcl:
         ]
 
     def _ask(self, requests: list[Request]) -> list[tuple[Figures | None, str | None]]:
-        """For each request FCL's figures, as far as they came, and how the process ended over it, if it did."""
+        """For each request: FCL's figures, if they arrived, and how the process ended, if this request ended it."""
         answers: list[tuple[Figures | None, str | None]] = []
         try:
             while len(answers) < len(requests):
@@ -128,7 +128,7 @@ class Fcl:
                     figures, end = self._answer(self._worker)
                     answers.append((figures, end))
         except BaseException:
-            self.close()  # or answers still on their way would be taken for those of later pairs
+            self.close()  # otherwise answers still on their way would be taken for answers to later pairs
             raise
         return answers
 
@@ -148,7 +148,7 @@ class Fcl:
 
 
 def _answers(requests: list[Request]) -> Iterator[Any]:
-    """In the process in which FCL runs: for each pair whether FCL finds contact, then its signed distance."""
+    """Runs in FCL's process. Yields for each pair whether FCL finds contact, then its signed distance."""
     for request in requests:
         bodies = [fcl.CollisionObject(_geometry(model), fcl.Transform(*pose)) for model, pose in request]
         contacts = fcl.CollisionResult()
@@ -159,7 +159,7 @@ def _answers(requests: list[Request]) -> Iterator[Any]:
 def _signed_distance(request: Request, bodies: list[Any], contacts: Any) -> float | None:
     if all(name != "Halfspace" for (name, _), _ in request):
         return float(fcl.distance(*bodies, fcl.DistanceRequest(enable_signed_distance=True)))
-    # FCL's distance from a half-space reads through a null pointer (its issue 383); its contact has the exact depth.
+    # FCL's distance from a half-space reads a null pointer (FCL issue 383). FCL's contact has the exact depth.
     return -float(contacts.contacts[0].penetration_depth) if contacts.contacts else None
 
 
@@ -184,7 +184,7 @@ def _unsupported(overlap: Overlap) -> str | None:
 
 
 def _request(overlap: Overlap) -> Request:
-    """A pair that is supported."""
+    """The request for a pair that FCL supports."""
     models = [facts(body.shape).fcl() for body in overlap.shapes]
     poses = [(np.roll(body.orientation, 1), body.position) for body in overlap.shapes]
     return tuple((model, pose) for model, pose in zip(models, poses) if not isinstance(model, str))
@@ -225,7 +225,7 @@ def _difference(ours: Figures, theirs: Figures) -> float:
 
 
 def _nearer(ours: Figures, theirs: Figures, exact: tuple[float, float]) -> Literal["ours", "fcl"] | None:
-    """Who is nearer to every value within `exact`: by the signed distances where they differ, else by yes or no."""
+    """The side that is nearer to every value within `exact`: by signed distance if these differ, else by yes or no."""
     lower, upper = exact
     threshold, ours_is_below = 0.0, ours.overlapping
     mine, other = ours.signed_distance, theirs.signed_distance

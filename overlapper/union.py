@@ -1,10 +1,10 @@
-"""The volume common to two unions of convex shapes, every point counted once.
+"""The common volume of two unions of convex shapes, every point counted once.
 
-Of unions ∪A and ∪B, inclusion–exclusion gives the volume as the sum over all sets S of A's shapes and T of B's of
-(−1)^(|S| + |T|) vol(∩S ∩ ∩T). Every term is an overlap of convex bodies with an error bound of its own, and those that
-are empty, with all that is in them, are never asked. Where many shapes lie over each other there would be 2^n terms.
-Then the union is taken apart into cells: its largest member, and, beyond each face of that, what the others have there.
-The cells are disjoint by construction, whatever rounding does to the planes.
+For unions ∪A and ∪B, inclusion–exclusion gives the volume as a sum over all sets S of A's shapes and T of B's shapes.
+The terms are (−1)^(|S| + |T|) vol(∩S ∩ ∩T). Every term is an overlap of convex bodies with its own error bound. If an
+overlap is empty, terms with more shapes are empty, too, and are not computed. If n shapes overlap each other, there
+would be 2^n terms. The union is then divided into cells: its largest member, and, beyond each face of this member, the
+parts of the other members. The cells are disjoint by construction, whatever rounding does to the planes.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from overlapper._core import Box, HalfSpace, Overlap, Placed, overlap
 Array = NDArray[np.float64]
 Method = Literal["auto", "paper"]
 
-# Terms per pair before inclusion–exclusion gives way to cells: n shapes over each other have (2^n − 1)/n, so more than
-# six of them are taken apart, which is where cells are the faster way for boxes.
+# The most terms per pair of inclusion–exclusion; beyond, cells are used. n shapes that overlap each other have
+# (2^n − 1)/n terms per pair, so more than six are divided into cells. For boxes, cells are then faster.
 TERMS = 16
 
-# The least tolerance of smooth shapes in cells, as every facet of a smooth member is the wall of a cell. Two spheres
-# make 1281 cells at 0.001, which take minutes. Polyhedra are exact whatever it is.
+# The least tolerance of smooth shapes in cells, because every facet of a smooth member is the wall of a cell. Two
+# spheres make 1281 cells at 0.001, which take minutes. Polyhedra are exact at any tolerance.
 COARSE = 0.1
 
 
@@ -34,12 +34,12 @@ COARSE = 0.1
 class UnionOverlap:
     """The overlap of two unions. True only if they overlap.
 
-    `volume` (m³) is within `volume_error` of the true one. It is the sum of convex parts, `terms` in number.
+    `volume` (m³) is within `volume_error` of the true volume. It is a sum over `terms` convex parts.
     """
 
     volume: float = 0.0
     volume_error: float = 0.0
-    # Each with its sign and, for each of its bodies, which of the two unions that belongs to.
+    # Each part with its sign and, for each of its bodies, the union to which the body belongs.
     _parts: list[tuple[int, Overlap, Sequence[int]]] = field(default_factory=list)
 
     def __bool__(self) -> bool:
@@ -51,12 +51,12 @@ class UnionOverlap:
 
     @property
     def about(self) -> Array | None:
-        """(3,) the point about which `gradient` rotates: the centroid of one part, in m; None unless they overlap."""
+        """(3,) the centre of rotation of `gradient`: the centroid of one part, in m; None unless the unions overlap."""
         return next(np.asarray(part.centroid) for _, part, _ in self._parts if part) if self else None
 
     @property
     def centroid(self) -> Array | None:
-        """(3,) of what is common, in the world, m; None unless they overlap."""
+        """(3,) the centroid of the common part, in the world, in m; None unless the unions overlap."""
         if not self:
             return None
         about = np.asarray(self.about)
@@ -65,8 +65,9 @@ class UnionOverlap:
 
     @property
     def gradient(self) -> Array:
-        """(2, 6) derivative of the volume as either union moves as a whole: translation (m²), and rotation vector about
-        `about` (m³), world axes; zeros unless they overlap.
+        """(2, 6) derivative of the volume by the motion of each whole union; zeros unless the unions overlap.
+
+        Columns: translation (m²) and rotation vector about `about` (m³), in world axes.
         """
         gradient = np.zeros((2, 6))
         about = np.asarray(self.about)
@@ -87,7 +88,7 @@ def union_overlap(
 ) -> UnionOverlap:
     """The overlap of the union of the shapes `a` with the union of the shapes `b`.
 
-    `tolerance` and `method` are those of `overlapper.overlap`, for every pair.
+    `tolerance` and `method` are passed to `overlapper.overlap` for every pair.
     """
     pairs = {
         (i, j): overlap(x, y, tolerance=tolerance, method=method) for i, x in enumerate(a) for j, y in enumerate(b)
@@ -96,14 +97,14 @@ def union_overlap(
 
 
 def of_pair(common: Overlap) -> UnionOverlap:
-    """As `union_overlap` of two shapes, from their overlap."""
+    """The result of `union_overlap` for two single shapes, from their overlap."""
     found = UnionOverlap()
     found._add(1, common, (0, 1))
     return found
 
 
 def of_pairs(a: Sequence[Placed], b: Sequence[Placed], pairs: Mapping[tuple[int, int], Overlap]) -> UnionOverlap:
-    """As `union_overlap`, from the overlaps of a[i] and b[j] by (i, j): of all pairs that are not separated."""
+    """The result of `union_overlap`, from the overlaps of a[i] and b[j] by (i, j), of all pairs not separated."""
     solid = {pair: each for pair, each in pairs.items() if each}
     for method in (_inclusion_exclusion, _cells):
         found = UnionOverlap(volume_error=sum(each.volume_error for each in pairs.values() if not each))
@@ -123,7 +124,7 @@ def union_volume(shapes: Sequence[Placed]) -> tuple[float, float]:
 def _inclusion_exclusion(
     found: UnionOverlap, a: Sequence[Placed], b: Sequence[Placed], pairs: Mapping[tuple[int, int], Overlap]
 ) -> bool:
-    """Add up all terms; False if there are too many, and then the sum is of no use."""
+    """Add up all terms. False if there are too many; the sum is then invalid."""
     tolerance = max((each.tolerance for each in pairs.values()), default=COARSE)
     boxes = {pair: np.asarray(each.bounds) for pair, each in pairs.items()}
     waiting: list[tuple[tuple[int, ...], tuple[int, ...], Array]] = []
@@ -149,9 +150,9 @@ def _inclusion_exclusion(
 def _one_more(
     first: tuple[int, ...], second: tuple[int, ...], boxes: Mapping[tuple[int, int], Array]
 ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], list[tuple[int, int]]]]:
-    """The sets with one more shape, and the pairs that this brings: every two sets are reached in one way only.
+    """The two sets with one more shape, and the new pairs. Every combination of two sets is reached in only one way.
 
-    The first set grows while the second has one shape, then the second; both in increasing order.
+    The first set grows while the second set has one shape. Then the second set grows. Both grow in increasing order.
     """
     if len(second) == 1:
         for i, j in boxes:
@@ -167,9 +168,9 @@ def _one_more(
 def _cells(
     found: UnionOverlap, a: Sequence[Placed], b: Sequence[Placed], pairs: Mapping[tuple[int, int], Overlap]
 ) -> bool:
-    """Add up disjoint cells: the largest member of a region, then what the others have beyond each of its faces."""
+    """Add up disjoint cells: the largest member of a region, then the parts of the others beyond each of its faces."""
     tolerance = max([COARSE, *(each.tolerance for each in pairs.values())])
-    # Regions yet to be added up: their members, and the half-spaces that bound them, each with the side it came from.
+    # Regions still to be added: their members, and the half-spaces that bound them, each with the union of its body.
     waiting: list[tuple[dict[tuple[int, int], Overlap], list[tuple[Placed, int]]]] = [
         ({(i, j): overlap(a[i], b[j], tolerance=tolerance) for i, j in pairs}, [])
     ]
@@ -179,7 +180,7 @@ def _cells(
         whole = members.pop(largest)
         sides = [0, 1, *(side for _, side in cuts)]
         found._add(1, whole, sides)
-        # A smooth member is less than its polytope, by up to twice its error, and what lies between is in no cell.
+        # A smooth member is smaller than its polytope, by up to twice its error. The space between is in no cell.
         found.volume_error += 2 * whole.volume_error
         planes = whole.halfspaces
         heights = {pair: planes[:, :3] @ each.vertices.T + planes[:, 3:] for pair, each in members.items()}
@@ -190,7 +191,7 @@ def _cells(
             region: dict[tuple[int, int], Overlap] = {}
             for (i, j), above in heights.items():
                 if above[k].max() <= 0 or (above[:k].min(axis=1) >= 0).any():
-                    continue  # within this face, or outside of an earlier one
+                    continue  # on the inner side of this face, or beyond an earlier face
                 part = overlap(a[i], b[j], *(wall for wall, _ in beyond), tolerance=tolerance)
                 if part:
                     region[i, j] = part

@@ -1,4 +1,4 @@
-"""`overlapper.watch(client)` in a script or a notebook; `python -m overlapper.watch` is `overlapper watch`."""
+"""`overlapper.watch(client)` for a script or a notebook; `python -m overlapper.watch` is `overlapper watch`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 class _Callable(ModuleType):
-    """A module that is called like what it is named after, as `python -m` wants a module of that name."""
+    """A module that can be called like the function of its name, because `python -m` needs a module of that name."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         from overlapper.scenes.watching import Watch
@@ -22,5 +22,5 @@ if __name__ == "__main__":
     sys.argv.insert(1, "watch")
     main()
 else:
-    watch = sys.modules[__name__]  # as whoever asks the package for it first gets it
+    watch = sys.modules[__name__]  # the object that the package returns for the name at first access
     watch.__class__ = _Callable

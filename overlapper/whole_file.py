@@ -1,11 +1,11 @@
-"""Files that are there whole or not at all: written beside their place, and renamed.
+"""Files that are written atomically: first beside their place, and then renamed.
 
-What is being written to `run.csv` is in `run.unfinished.csv`, or, if another run is at it or was killed there, in
-`run.unfinished-2.csv`, and so on. A name that is taken is never written to, so that no run disturbs another, and
-nothing that a run has left is lost.
+`run.csv` is first written to `run.unfinished.csv`. If another run uses that name or was killed there, the file is
+`run.unfinished-2.csv`, and so on. An existing file is never written to, so that no run disturbs another, and the data
+of a killed run are not lost.
 
-Pages, meshes and the like are written at once, to a hidden file that is locked meanwhile. A part of a page is of no
-use: the next run takes over what a killed one has left. Without locks (Windows, some network disks) it stays.
+Pages, meshes and similar files are written at once, to a hidden file that is locked meanwhile. An incomplete page is of
+no use, so the next run reuses the file of a killed run. Without locks (Windows, some network disks) this file stays.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ except ImportError:  # on Windows
 
 
 def unfinished(place: Path, number: int = 1, ending: str | None = None) -> Path:
-    """The name beside `place` of what is not to take it, or not yet; `ending` is that of `place` by default."""
+    """The name beside `place` of a file that does not replace it, or not yet. Without `ending`, that of `place`."""
     more = f"-{number}" if number > 1 else ""
     return place.with_name(f"{place.stem}.unfinished{more}{place.suffix if ending is None else ending}")
 
 
 def claim(place: Path, ending: str | None = None) -> Path:
-    """A new and empty file beside `place`, to be written and then moved to it; `ending` is that of `place` by default.
+    """A new, empty file beside `place`, to be written and then moved to it. The default `ending` is that of `place`.
 
-    OSError if there can be none, or if `place` is what no file should replace: a folder, a device.
+    OSError if the file cannot be made, or if `place` is a folder or a device, which no file should replace.
     """
     _must_be_replaceable(place)
     number = 1
@@ -55,7 +55,7 @@ def _must_be_replaceable(place: Path) -> None:
 
 
 def _opened(path: Path, place: Path, flags: int) -> int:
-    """A file that is made if it is not there. FileExistsError is of the file, any other OSError of its place."""
+    """Open a file, and make it if it is missing. FileExistsError is about the file, any other OSError about `place`."""
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT | flags, 0o666)
     except FileExistsError:
@@ -65,7 +65,7 @@ def _opened(path: Path, place: Path, flags: int) -> int:
 
 
 def _own(place: Path) -> tuple[Path, int | None]:
-    """An empty file beside `place` and the descriptor that locks it: a new file, or what a killed process has left."""
+    """An empty file beside `place` and the descriptor that locks it: a new file, or the file of a killed process."""
     for number in itertools.count(1) if fcntl else ():
         path = place.with_name(f".{place.stem}.begun-by-overlapper-{number}{place.suffix}")
         descriptor = _opened(path, place, 0)
@@ -93,12 +93,12 @@ def _disown(path: Path, lock: int | None, remove: bool) -> None:
 
 
 def settle(written: Path, place: Path) -> None:
-    """Move what was written to its place, on the disk itself; what was there is gone from then on."""
-    # A link stays one: what it points to is replaced.
+    """Flush the written file to the disk and move it to its place, where it replaces the earlier file."""
+    # A link stays a link: its target is replaced.
     target = Path(os.path.realpath(place))
-    descriptor = os.open(written, os.O_RDWR)  # Windows puts no file on the disk that is open to be read alone
+    descriptor = os.open(written, os.O_RDWR)  # Windows cannot flush a file that is open only for reading
     try:
-        os.fsync(descriptor)  # a disk that is full, or gone, may say so no earlier
+        os.fsync(descriptor)  # a full or missing disk may raise its error only here
     finally:
         os.close(descriptor)
     with suppress(FileNotFoundError):
@@ -108,7 +108,7 @@ def settle(written: Path, place: Path) -> None:
 
 @contextmanager
 def beside(place: str | Path) -> Iterator[Path]:
-    """An empty file to be written, which takes its place when the block ends; if that raises, all is as it was."""
+    """An empty file to be written. It takes its place when the block ends; if the block raises, nothing changes."""
     place = Path(place)
     _must_be_replaceable(place)
     path, lock = _own(place)
@@ -122,6 +122,6 @@ def beside(place: str | Path) -> Iterator[Path]:
 
 
 def must_be_writable(place: Path) -> None:
-    """OSError if a file could not be put there: better now than after a run."""
+    """OSError if a file cannot be put at `place`, so that the error comes before a run and not after it."""
     _must_be_replaceable(place)
     _disown(*_own(place), remove=True)

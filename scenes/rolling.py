@@ -37,7 +37,7 @@ def build(client: int):
 
 
 def _rest(balls: int, length: float, weight: float) -> float:
-    """How deep a ball, a cylinder or both in one stand in a plane: as deep as what they share weighs."""
+    """The depth in a plane at which the shared volume of a ball, a cylinder or both in one carries the weight."""
     low, high = 0.0, RADIUS
     while (depth := (low + high) / 2) not in (low, high):
         cap = math.pi * depth**2 * (RADIUS - depth / 3)

@@ -22,9 +22,11 @@ HERE = Path(__file__).parent
 
 
 def pytest_collection_modifyitems(items):
-    """Turns off line coverage for tests of the core: it would slow down their exact arithmetic by a half."""
+    """Turns off line coverage where it would slow down exact arithmetic by a half: tests of the core, long proofs."""
+    uncovered = [HERE / "native", HERE / "support"]
+    uncovered += [HERE / "proof" / f"test_{name}.py" for name in ("arcs", "certificate", "far_places")]
     for item in items:
-        if item.path.is_relative_to(HERE / "native") or item.path.is_relative_to(HERE / "support"):
+        if any(item.path.is_relative_to(each) for each in uncovered):
             item.add_marker("no_cover")
 
 

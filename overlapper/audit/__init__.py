@@ -1,1 +1,1 @@
-"""Which pairs of links of a robot can overlap at all: joints placed at random within their limits, many at once."""
+"""Which pairs of links of a robot can overlap: sampled by joints at random within their limits, many at once."""

@@ -1,4 +1,4 @@
-"""Pairs that may overlap, as they are named on the command line: two patterns with a comma between them."""
+"""Pairs that are allowed to overlap. The command line names each by two patterns with a comma between them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Patterns = tuple[str, str]
 
 
 def allowed_pair(text: str) -> Patterns:
-    """The two patterns of "A,B". ValueError if these are not two."""
+    """The two patterns of "A,B". ValueError if there are not exactly two patterns."""
     first, comma, second = text.partition(",")
     if not (first and comma and second):
         raise ValueError(f"--expect must be two names with a comma between them, not {text!r}")
@@ -17,7 +17,7 @@ def allowed_pair(text: str) -> Patterns:
 
 
 def must_name_some(allowed: Sequence[Patterns], names: Collection[str], kind: str) -> None:
-    """ValueError if a pattern names nothing of that kind."""
+    """ValueError if a pattern matches none of the `names`. `kind` is the word for the named things in the message."""
     for pattern in (each for pair in allowed for each in pair):
         if not any(fnmatchcase(name, pattern) for name in names):
             raise ValueError(f"no {kind} is called {pattern!r}")

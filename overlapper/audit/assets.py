@@ -1,4 +1,4 @@
-"""A pile of assets, models and meshes: what loads, what is closed, what is left out, and what overlaps in itself."""
+"""Checks a folder of models and meshes: which load, are closed, have parts left out, or overlap within themselves."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from overlapper.simulation.settings import Modelling
 from overlapper.tables.table import Row
 from overlapper.tables.table_file import TABLES, origin
 
-# Every column of a table of assets, in order, with its type. `closed` is 1 or 0, and empty for a model. `overlaps` is
-# JSON: names, volume in m³ and depth in m.
+# The columns of a table of assets, in order, with their types. `closed` is 1 or 0; it is empty for a model. `overlaps`
+# is JSON: names, volume in m³ and depth in m.
 COLUMNS: dict[str, type] = {
     "asset": str,
     "status": str,
@@ -43,7 +43,10 @@ MESHES = (".obj", ".off", ".ply", ".stl", ".3mf", ".glb", ".gltf", ".step", ".st
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """Two parts of an asset that overlap at rest: `volume` in m³, `depth` in m of the deepest two shapes."""
+    """Two parts of an asset that overlap at rest: their common `volume` in m³, and the largest `depth` of a pair in m.
+
+    The depth is the largest over all pairs of shapes of the two parts.
+    """
 
     names: tuple[str, str]
     volume: float
@@ -52,12 +55,12 @@ class Shared:
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """A file, by its path in the folder.
+    """A file. `name` is its path relative to the folder.
 
-    `failure` says why it cannot be read, "" if it can. It has so many `bodies`, of a mesh, or `links` with shapes, of a
-    model, and convex `shapes`. `closed` says whether all meshes bound a volume; None of a model. `skipped` are
-    sentences on what is left out. `excess` is the fraction by which convex parts have more volume than their mesh, of
-    the mesh that gains most; None if no mesh is concave.
+    `failure` says why the file cannot be read; it is "" if the file can be read. `bodies` counts the bodies of a mesh
+    file, or the links with shapes of a model. `shapes` counts the convex shapes. `closed` says whether all meshes bound
+    a volume; it is None for a model. `skipped` are sentences on what is left out. `excess` is the fraction by which the
+    convex parts have more volume than their mesh, the largest over all meshes; None if no mesh is concave.
     """
 
     name: str
@@ -71,17 +74,17 @@ class Asset:
 
     @property
     def sound(self) -> bool:
-        """Whether it can be read, nothing is open or left out, and nothing overlaps."""
+        """Whether the file can be read, no mesh is open, nothing is left out, and nothing overlaps."""
         return not (self.failure or self.skipped or self.overlaps) and self.closed is not False
 
     @property
     def status(self) -> str:
-        """Whether it is sound, in words."""
+        """The status of the file in words: sound, not read or not sound."""
         return "sound" if self.sound else "not read" if self.failure else "not sound"
 
 
 def asset_files(folder: Path) -> list[Path]:
-    """The models and meshes in a folder and those in it, sorted. ValueError if there is none."""
+    """The models and meshes in a folder and its subfolders, sorted. ValueError if there is none."""
     found = sorted(
         path
         for path in folder.rglob("*")
@@ -96,7 +99,7 @@ def asset_files(folder: Path) -> list[Path]:
 
 
 def _is_mjcf(path: Path) -> bool:
-    """Whether a file is MJCF by its beginning. A file that cannot be opened is taken for one, and told later."""
+    """Whether the beginning of a file is MJCF. A file that cannot be opened counts as MJCF and is reported later."""
     try:
         with path.open("rb") as file:
             return b"<mujoco" in file.read(4000)
@@ -105,10 +108,10 @@ def _is_mjcf(path: Path) -> bool:
 
 
 def read_asset(folder: Path, path: Path, units: str, least_depth: float, modelling: Modelling) -> Asset:
-    """One of the files; `units` are those of meshes that do not say theirs.
+    """Read one of the files. `units` is the unit of meshes whose file does not state one.
 
-    Overlaps of a depth of `least_depth` (m) or less do not count, nor do those that the rounding of corners to six
-    digits explains. A file that cannot be read, or needs a missing library, has this as its failure.
+    Overlaps with a depth of `least_depth` (m) or less do not count. Overlaps that the rounding of corners to six digits
+    explains do not count either. If a file cannot be read or needs a missing library, its `failure` says so.
     """
     name = path.relative_to(folder).as_posix()
     of_kind: Callable[..., Asset] = _model if path.suffix.lower() in ENDINGS else _mesh
@@ -118,7 +121,7 @@ def read_asset(folder: Path, path: Path, units: str, least_depth: float, modelli
         return _unread(name, f"{error.strerror}")
     except (ImportError, NotRead, RuntimeError, ValueError) as error:
         return _unread(name, first_line(error).removeprefix(f"{path} ").removeprefix(f"{path}: "))
-    except Exception as error:  # a fault of ours, which must not keep the other files from their lines
+    except Exception as error:  # a bug of this package must not stop the report on the other files
         return _unread(name, f"{type(error).__name__}: {first_line(error)}")
 
 

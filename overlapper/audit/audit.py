@@ -1,4 +1,4 @@
-"""An audit of a robot: whether, how often, how much and how deep each pair of links overlaps, and where."""
+"""An audit of a robot: how often each pair of links overlaps, with which volume and depth, and in which poses."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from overlapper.simulation.links import LinkContact, link_contacts
 
 Status = Literal["never", "sometimes", "always"]
 
-FEW = 4  # blocks, which are done here in the time that another process takes to start
-NORMAL_95 = 1.959963984540054  # between minus this and this are 95 % of a normal distribution
+FEW = 4  # blocks: this process does them in the time that another process takes to start
+NORMAL_95 = 1.959963984540054  # 95 % of a normal distribution lie between minus this value and this value
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A configuration by its number: `values` (m,) by the columns of the robot, in rad and m.
+    """A configuration by its number: `values` (m,) in the order of the robot's columns, in rad and m.
 
-    `contact` is what the two links share in this configuration.
+    `contact` is the overlap of the two links in this configuration.
     """
 
     number: int
@@ -42,8 +42,8 @@ class Pose:
 class PairAudit:
     """A pair of links, by their `names`, and in how many configurations it overlapped.
 
-    The pair overlapped in `met` of `asked` configurations: "never", "sometimes" or "always". `fraction` is the fraction
-    of the random configurations, with the bounds of its 95 % Wilson interval; None without random configurations.
+    The pair overlapped in `met` of `asked` configurations. `status` is "never", "sometimes" or "always". `fraction` is
+    the fraction among random configurations, with the bounds of its 95 % Wilson interval; None without any of these.
     `largest` is the configuration with the largest volume, summed over the pairs of shapes. `deepest` is the
     configuration with the largest depth.
     """
@@ -79,11 +79,11 @@ def audit(
     engine: Executor | None = None,
     progress: Callable[[Iterator[Tally], int], Iterable[Tally]] = lambda blocks, count: blocks,
 ) -> Audit:
-    """Audit a robot in so many configurations. The answer does not depend on the engine.
+    """Audit a robot in the given number of configurations. The result does not depend on the engine.
 
-    `tolerance` is that of `overlapper.overlap`. Overlaps of a depth of `least_depth` (m) or less do not count.
-    `progress(blocks, count)` passes on the tallies of the `count` blocks. ValueError for less than one configuration,
-    or a negative seed.
+    `tolerance` has the same meaning as in `overlapper.overlap`. Overlaps with a depth of `least_depth` (m) or less do
+    not count. `progress(blocks, count)` passes on the tallies of the `count` blocks. ValueError for less than one
+    configuration, or a negative seed.
     """
     sampling = Sampling(robot, configurations, seed)
     examiner = Examiner(robot, sampling, tolerance, least_depth)
@@ -103,12 +103,12 @@ def audit(
 
 
 def wilson(met: int, asked: int) -> tuple[float, float, float]:
-    """A fraction, and the bounds of the interval of Wilson that holds the probability behind it with 95 %."""
+    """A fraction, and the bounds of the 95 % Wilson interval of the underlying probability."""
     fraction, z = met / asked, NORMAL_95
     middle, weight = fraction + z * z / (2 * asked), 1 + z * z / asked
     spread = z * math.sqrt(fraction * (1 - fraction) / asked + z * z / (4 * asked * asked))
     lower, upper = (middle - spread) / weight, (middle + spread) / weight
-    return fraction, lower if met else 0.0, upper if met < asked else 1.0  # which rounding would miss
+    return fraction, lower if met else 0.0, upper if met < asked else 1.0  # rounding would miss 0 and 1
 
 
 def _tallies(examiner: Examiner, engine: Executor | None) -> Iterator[Tally]:
@@ -125,7 +125,7 @@ def _tallies(examiner: Examiner, engine: Executor | None) -> Iterator[Tally]:
 
 
 class _Sights:
-    """Measures two links in one configuration again, with all that can be asked of an overlap."""
+    """Measures two links in one configuration again, with all quantities of an overlap."""
 
     def __init__(self, examiner: Examiner) -> None:
         self._examiner, tree = examiner, examiner.robot.tree

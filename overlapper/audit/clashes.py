@@ -1,8 +1,8 @@
 """Which bodies of mesh files clash: all pairs of a folder, of files, or of one assembly.
 
-Two bodies are apart if their convex hulls are. The common volume of closed meshes that are not convex is measured on
-the meshes (`overlapper.polytopes.mesh_overlap`). If there is any, convex parts stand for the meshes
-(`overlapper.polytopes.decomposition`): the depth is that of the parts, and a page shows the parts.
+Two bodies are separated if their convex hulls are separated. The common volume of closed meshes that are not convex is
+measured on the meshes (`overlapper.polytopes.mesh_overlap`). If it is not zero, the meshes are replaced by convex parts
+(`overlapper.polytopes.decomposition`). The depth is the depth of the parts, and a page shows the parts.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 Status = Literal["clash", "expected", "shallow", "touching"]
 Way = Literal["convex", "decomposed", "hull", "unknown"]
 
-SHARED = "#ff4fa3"  # a colour that parts hardly ever have
+SHARED = "#ff4fa3"  # a colour that is rare among parts
 GREY = (0.62, 0.66, 0.72, 1.0)
 # The colours of clashing bodies, in turn. They differ from each other and from the colour of the overlap.
 COLORS = [(0.35, 0.60, 0.90, 1.0), (0.55, 0.78, 0.40, 1.0), (0.95, 0.72, 0.30, 1.0), (0.45, 0.75, 0.75, 1.0)]
@@ -48,15 +48,15 @@ COLORS += [(0.62, 0.55, 0.85, 1.0), (0.80, 0.62, 0.48, 1.0)]
 class MeshBody:
     """A body of a mesh file as it was measured, in world coordinates, in m.
 
-    `triangles` (t, 3, 3) are those of a closed mesh, counter-clockwise from outside. They are None if the mesh bounds
-    no known volume. `parts` are the convex bodies that stand for the mesh. `way` says how they were made:
+    `triangles` (t, 3, 3) are the triangles of a closed mesh, counter-clockwise from outside. They are None if the mesh
+    bounds no known volume. `parts` are the convex bodies that replace the mesh. `way` says how they were made:
 
-    - "convex": the mesh consists of them.
+    - "convex": the mesh consists of these convex bodies.
     - "decomposed": CoACD made them.
     - "hull": the only part is the convex hull.
     - "unknown": the only part is the convex hull, which is not enough to measure the body.
 
-    `parts_volume` is the volume of the union of the parts, `mesh_volume` that of the mesh, in m³.
+    `parts_volume` is the volume of the union of the parts. `mesh_volume` is the volume of the mesh. Both are in m³.
     """
 
     name: str
@@ -69,23 +69,23 @@ class MeshBody:
 
     @property
     def excess(self) -> float | None:
-        """The fraction of the mesh's volume by which that of the parts is larger, None if the mesh bounds none."""
+        """How much larger the volume of the parts is, as a fraction of the mesh's volume; None if that is unknown."""
         return self.parts_volume / self.mesh_volume - 1 if self.mesh_volume else None
 
 
 @dataclass(frozen=True, slots=True)
 class Clash:
-    """Two bodies that touch or overlap, by their places among the bodies.
+    """Two bodies that touch or overlap, by their indices in the list of bodies.
 
     `status` says what the overlap means:
 
-    - "clash": it was not expected.
-    - "expected": the names of the two are among the expected pairs.
-    - "shallow": it is less deep than asked.
-    - "touching": it is no more than the rounding of corners explains, which files write with six digits.
+    - "clash": the overlap is not expected.
+    - "expected": the names of the two bodies are among the expected pairs.
+    - "shallow": the depth is less than the least depth of a clash.
+    - "touching": the overlap can be explained by rounding, because files write corners with six digits.
 
     `volume` (m³) is within `volume_error` of the common volume: of the meshes if `of_meshes`, else of their parts.
-    `parts` has what the parts share, with depth and normal; None if they share nothing.
+    `parts` is the overlap of the parts, with depth and normal; None if they share nothing.
     """
 
     pair: tuple[int, int]
@@ -98,14 +98,17 @@ class Clash:
 
     @property
     def depth(self) -> float | None:
-        """m, of the deepest pair of parts: moving the first by as much along `parts.normal` separates these."""
+        """The depth (m) of the deepest pair of parts: moving the first by it along `parts.normal` separates the two."""
         return self.parts.depth if self.parts is not None else None
 
 
 @dataclass(slots=True)
 class Clashes:
-    """The bodies; the pairs that touch or overlap, the largest volume first; and sentences, of what could not be
-    measured and of what was measured otherwise than asked."""
+    """The bodies, and the pairs that touch or overlap, the largest volume first.
+
+    `failures` are sentences about what could not be measured. `remarks` are sentences about what was measured in
+    another way than requested.
+    """
 
     bodies: list[MeshBody]
     pairs: list[Clash]
@@ -117,10 +120,10 @@ class Clashes:
 
 
 def read(paths: Sequence[Path], units: str) -> tuple[list[tuple[str, MeshPart]], list[str]]:
-    """The bodies of files and folders by their names, and what is wrong with files, a sentence each.
+    """The bodies of files and folders with their names, and one sentence for each file that cannot be read.
 
-    A file is named by its path from the folder that all are in. A body of an assembly is named by the path of its node,
-    behind that of the file if there are several files. ImportError without a library that a format needs.
+    The name of a file is its path from the common folder of all files. The name of a body of an assembly is the path of
+    its node, after the name of the file if there are several files. ImportError without a library that a format needs.
     """
     files = list(dict.fromkeys(file for path in paths for file in _files(path)))
     folder = Path(os.path.commonpath([file.absolute().parent for file in files]))
@@ -163,9 +166,9 @@ def clashes(
 ) -> Clashes:
     """The clashes among all pairs of bodies.
 
-    A mesh that is not convex is decomposed where it shares something; `threshold` is CoACD's, and with `enclose` it
-    lays walls around what is open. `least_depth` (m) is the least of a clash, and `expected` are pairs of names that
-    may overlap, as fnmatch has them. ValueError for one that names no body.
+    A mesh that is not convex is decomposed if it overlaps another body. `threshold` is CoACD's threshold. With
+    `enclose`, CoACD lays walls around open meshes. `least_depth` (m) is the least depth of a clash. `expected` are
+    pairs of fnmatch patterns of names that may overlap. ValueError for a pattern that names no body.
     """
     must_name_some(expected, [name for name, _ in parts], "body")
     found = Clashes([], [], [], [])
@@ -194,7 +197,7 @@ def clashes(
 
 
 def write_table(found: Clashes, path: Path, settings: Mapping[str, Any]) -> None:
-    """The pairs as a table of `overlapper run` by links, whose volumes are those of the pairs."""
+    """Write the pairs as a table of `overlapper run` by links. The volumes are the volumes of the pairs."""
     excess = {body.name: body.excess for body in found.bodies if body.way == "decomposed"}
     texts = {name: str(value) for name, value in settings.items()}
     table = TABLES[path.suffix](path, origin() | texts | {"excess": json.dumps(excess)})
@@ -216,7 +219,7 @@ def _row(clash: Clash) -> Row:
 
 
 def write_page(found: Clashes, path: Path) -> None:
-    """A page of the bodies, translucent, and of what those share that clash or may. ImportError without meshcat."""
+    """Write a page: the bodies, translucent, and all overlaps that are not "touching". ImportError without meshcat."""
     from overlapper.viewer import Look, Recording
 
     links = [pair.parts for pair in found.pairs if pair.status != "touching" and pair.parts is not None]
@@ -227,7 +230,7 @@ def write_page(found: Clashes, path: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _DrawnMeshes:
-    """The bodies, as views are given them."""
+    """The bodies in the form that views take."""
 
     keys: list[tuple[int, int, int]]
     placed: list[Placed]
@@ -237,7 +240,7 @@ class _DrawnMeshes:
 
 @dataclass(frozen=True, slots=True)
 class _Whole:
-    """A mesh as it is drawn, in the place of a `Placed`."""
+    """A mesh to be drawn, in place of a `Placed`."""
 
     shape: Any
     position: Array
@@ -246,7 +249,7 @@ class _Whole:
 
 
 def _drawn(found: Clashes) -> _DrawnMeshes:
-    """The bodies by their parts if they clash, as what is shared is of these, and by their meshes if they do not."""
+    """Bodies that overlap are drawn by their parts, because the overlaps are between parts; others by their meshes."""
     from overlapper.viewer.tessellation import Mesh
 
     clashing = list(dict.fromkeys(i for pair in found.pairs if pair.status != "touching" for i in pair.pair))
@@ -261,7 +264,7 @@ def _drawn(found: Clashes) -> _DrawnMeshes:
         else:
             keys += [(i, -1, k) for k in range(len(body.parts))]
             placed += [Placed(part) for part in body.parts]
-    # A slash would make two names of one, of a body and its link.
+    # A slash would split the name into the name of a body and the name of its link.
     names = {(i, -1): body.name.replace("/", ".") for i, body in enumerate(found.bodies)}
     return _DrawnMeshes(keys, placed, dict.fromkeys(names, GREY) | colors, names)
 
@@ -276,14 +279,14 @@ class _Shared:
 
 
 def _still(bodies: Sequence[MeshBody]) -> Still:
-    """The parts where they stand, as the shapes of a body each."""
+    """The parts at their places. The parts of a mesh are the shapes of one body."""
     keys = [(i, -1, k) for i, body in enumerate(bodies) for k in range(len(body.parts))]
     names = {(i, -1): body.name for i, body in enumerate(bodies)}
     return Still(keys, [part for body in bodies for part in body.parts], *_nowhere(len(keys)), names, {})
 
 
 def _nowhere(count: int) -> tuple[Array, Array]:
-    """The poses of shapes that stand where their points are."""
+    """Identity poses, for shapes whose points are in world coordinates."""
     return np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
 
 
@@ -292,7 +295,7 @@ def _overlaps(hulls: Sequence[Hull]) -> Overlaps:
 
 
 def _with_surface(body: MeshBody) -> MeshBody:
-    """With the triangles of its mesh, if that is closed, and as convex bodies, if it consists of these."""
+    """The body with the triangles of its mesh, if the mesh is closed, and with its convex bodies, if it has them."""
     try:
         surface = WeldedMesh.of(body.part.triangles)
     except NotDecomposed:  # no triangle has an area
@@ -307,10 +310,10 @@ def _with_surface(body: MeshBody) -> MeshBody:
 
 
 def _of_parts(body: MeshBody, parts: Sequence[Hull], way: Way) -> MeshBody:
-    """With these parts where they stand; as it was, if none of them has a volume there."""
+    """The body with these parts, placed. If the transform leaves none of them a volume, the body is returned as is."""
     placed: list[Hull] = []
     for part in parts:
-        with suppress(ValueError):  # which the transform has made flat
+        with suppress(ValueError):  # the transform has made the part flat
             placed.append(Hull(body.part.placed(part.vertices)))
     if not placed:
         return body
@@ -319,7 +322,7 @@ def _of_parts(body: MeshBody, parts: Sequence[Hull], way: Way) -> MeshBody:
 
 
 def _shared(a: MeshBody, b: MeshBody) -> _Shared | None:
-    """The overlap of the meshes. None if both are convex or one is not closed: then their parts must be measured."""
+    """The overlap of the meshes. None if both are convex or one is not closed; then the parts must be measured."""
     if a.way == b.way == "convex" or a.triangles is None or b.triangles is None:
         return None
     found = mesh_overlap(a.triangles, b.triangles)
@@ -331,7 +334,7 @@ def _shared(a: MeshBody, b: MeshBody) -> _Shared | None:
 
 
 def _area_within(triangles: Array, lower: Array, upper: Array) -> float:
-    """An upper bound of the area of triangles within a box: none has more than the largest section of the box."""
+    """An upper bound of the area of triangles within a box: no triangle exceeds the largest section of the box."""
     within = ((triangles.min(axis=1) <= upper) & (triangles.max(axis=1) >= lower)).all(axis=1)
     a, b, c = triangles[within].transpose(1, 0, 2)
     x, y, z = np.maximum(upper - lower, 0.0)
@@ -340,18 +343,18 @@ def _area_within(triangles: Array, lower: Array, upper: Array) -> float:
 
 
 def _rounding(a: MeshBody, b: MeshBody) -> float:
-    """m: by how much rounding the corners may have moved two surfaces towards each other."""
+    """The distance (m) by which rounding of corners may have moved two surfaces towards each other."""
     reach = max(float(np.abs(part.bounds).max()) for body in (a, b) for part in body.parts)
     return 2 * math.sqrt(3) * ROUNDING * reach
 
 
 def _decompose(found: Clashes, needed: set[int], threshold: float, enclose: bool) -> None:
-    """Replace the hulls of bodies that are not convex by convex parts; a body that needs parts and has none fails."""
+    """Replace the hulls of bodies that are not convex by convex parts. A body that needs parts but gets none fails."""
     for i, body in enumerate(found.bodies):
         if body.way == "convex" or i not in needed:
             continue
         try:
-            # In the frame of the mesh, so that instances of one are decomposed once.
+            # In the frame of the mesh, so that several instances of a mesh are decomposed only once.
             made = decompose(body.part.triangles, threshold, enclose=enclose)
             found.bodies[i] = _of_parts(body, made.parts, "decomposed")
         except NotDecomposed as error:
@@ -369,7 +372,7 @@ def _clash(
     link: LinkContact | None,
     least_depth: float,
 ) -> Clash | None:
-    """The clash of a pair; None if the two are apart, or one of them could not be measured."""
+    """The clash of a pair; None if the two bodies are separated, or one of them could not be measured."""
     a, b = (bodies[i] for i in pair)
     if "unknown" in (a.way, b.way):
         return None
@@ -390,6 +393,6 @@ def _clash(
 
 
 def _expected(clash: Clash, expected: Sequence[tuple[str, str]]) -> Clash:
-    """The clash, with the status "expected" if the two may overlap."""
+    """The clash, with the status "expected" if the two bodies are allowed to overlap."""
     may = clash.status == "clash" and is_allowed(clash.names, expected)
     return replace(clash, status="expected") if may else clash

@@ -1,4 +1,4 @@
-"""Which links overlap in a block of configurations: the work that is spread over processes."""
+"""Finds which links overlap in a block of configurations. Blocks are spread over processes."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from overlapper.shapes.table import facts
 
 Mask = NDArray[np.bool_]
 
-AT_ONCE = 16_384  # shapes that are placed at once, so that what is at work stays in the caches
-COMPARED = 1_000_000  # distances between balls at once, likewise
+AT_ONCE = 16_384  # shapes that are placed at once: few enough to stay in the processor's caches
+COMPARED = 1_000_000  # distances between balls that are computed at once, for the same reason
 
-WITH_ADJACENT = 512  # random configurations in which adjacent links are asked for
-SLACK = 1e-12  # of the largest coordinate: some thousand units in the last place, of which kinematics take a few
+WITH_ADJACENT = 512  # random configurations in which adjacent links are tested
+SLACK = 1e-12  # of the largest coordinate: thousands of units in the last place; kinematics lose only a few
 
 
 class Examiner:
-    """Looks at blocks of configurations, and keeps one `Batch` from block to block.
+    """Tests blocks of configurations, and keeps one `Batch` from block to block.
 
-    Adjacent links overlap by design in most robots, and their overlap depends on the joints between them alone. They
-    are asked for at rest, at the corners and in the first 512 random configurations. Those that no joint moves are
-    asked for at rest. What overlaps by a depth of `least_depth` (m) or less is taken not to.
+    Adjacent links overlap by design in most robots, and their overlap depends only on the joints between them. They are
+    tested at rest, at the corners and in the first 512 random configurations. Pairs that no joint moves are tested only
+    at rest. Overlaps with a depth of `least_depth` (m) or less do not count.
     """
 
     def __init__(self, robot: Robot, sampling: Sampling, tolerance: float = 1e-3, least_depth: float = 0.0) -> None:
@@ -59,12 +59,12 @@ class Examiner:
     def setup(self) -> bytes:
         """The argument with which `prepared` makes the same examiner in another process.
 
-        It is bytes, because jobs are compared and arrays have no single answer to ==.
+        It is bytes because jobs are compared, and == between arrays does not give a single bool.
         """
         return pickle.dumps((self.robot, self.sampling.count, self.sampling.seed, self.tolerance, self.least_depth))
 
     def shape_pairs(self, *pairs: LinkPair) -> Counts:
-        """(s, 2): the pairs of shapes of these pairs of links, as places among the shapes."""
+        """(s, 2): the pairs of shapes of these pairs of links, as indices of shapes."""
         among = np.isin(self._pair, [self.pairs.index(pair) for pair in pairs])
         return np.stack([self._first[among], self._second[among]], axis=1)
 
@@ -85,7 +85,7 @@ class Examiner:
         positions, orientations = self.kinematics.poses(configurations)
         rows, among = self._near(positions, orientations, np.flatnonzero(asked[self._pair]))
         n, k = len(numbers), self.kinematics.count
-        # The batch has so many copies of the shapes; those that are left over stay where they were.
+        # The batch holds `_copies` copies of the shapes. Copies that are not needed now keep their old poses.
         self._positions[:n], self._orientations[:n] = positions, orientations
         found = self._batch.overlaps(
             self._positions.reshape(-1, 3),
@@ -101,7 +101,7 @@ class Examiner:
         return seen.tally(asked, numbers, self.sampling.first_random)
 
     def _near(self, positions: Array, orientations: Array, wanted: Counts) -> tuple[Counts, Counts]:
-        """Configurations and pairs of shapes, among the `wanted`, whose balls meet: (m,) each."""
+        """Configurations (m,) and pairs of shapes (m,), among the `wanted` pairs, whose bounding balls meet."""
         centres = positions + rotated(orientations, self._centres)
         slack = SLACK * float(np.abs(centres).max(initial=0.0))
         columns = np.ascontiguousarray(centres.transpose(2, 1, 0))

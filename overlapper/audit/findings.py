@@ -1,4 +1,4 @@
-"""The faults that an audit finds in a robot, in sentences. CI fails if there are any."""
+"""The faults that an audit finds in a robot, as sentences. CI fails if there are any."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from overlapper.audit.srdf import Names
 
 
 def findings(audit: Audit, expected: Sequence[Patterns], disabled: Mapping[Names, str]) -> list[str]:
-    """A sentence for each link that is not looked at whole, and each pair that overlaps and is not `expected` to.
+    """A sentence for each link that is not modelled completely, and each faulty pair that is not `expected`.
 
-    A pair is told if it is not adjacent and overlaps always, or if it overlaps and an SRDF file disables it. `disabled`
-    are the pairs that the file disables, with its reasons: "Never" is a pair that does not overlap. Also a sentence for
-    each link that the file names and the robot does not have.
+    A pair is faulty if it is not adjacent and always overlaps, or if it overlaps although an SRDF file disables it.
+    `disabled` are the pairs that the file disables, with its reasons. The reason "Never" says that the pair does not
+    overlap. There is also a sentence for each link that the file names and the robot does not have.
     """
     sentences = [f"Not modelled: {name}, {reason}." for name, reason in not_modelled(audit.robot).items()]
     unknown = {name for names in disabled for name in names} - set(audit.robot.link_names)
@@ -27,7 +27,7 @@ def findings(audit: Audit, expected: Sequence[Patterns], disabled: Mapping[Names
 
 
 def _wrong(audited: PairAudit, reason: str | None) -> list[str]:
-    """What is wrong with a pair that overlaps, in a sentence or none; `reason` is why a file disables the pair."""
+    """The sentence on a faulty pair that overlaps, or no sentence; `reason` is why a file disables the pair."""
     names, adjacent = " and ".join(audited.names), audited.pair.adjacent
     if audited.status == "always" and not adjacent and reason != "Always":
         return [f"{names} always overlap, and no joint ties them."]

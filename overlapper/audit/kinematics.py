@@ -1,4 +1,4 @@
-"""Where the shapes of a robot are, in many configurations at once."""
+"""The poses of the shapes of a robot, in many configurations at once."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Numbers = Sequence[Array | float]  # the components of a vector, a quaternion or
 
 
 class Kinematics:
-    """Places the shapes of `robot.tree.shapes`, which are `count`, without pybullet.
+    """Places the `count` shapes of `robot.tree.shapes`, without pybullet.
 
-    Rounding: the orientation of a link is that of its parent times one quaternion, and off by a few units in the last
-    place for each joint from the base. Its position is off by as much times the length of the arm.
+    Rounding: the orientation of a link is its parent's orientation times one quaternion. Each joint from the base adds
+    an error of a few units in the last place. The error of the position is this error times the length of the arm.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -25,7 +25,7 @@ class Kinematics:
         self.count = len(self._shapes)
         names = {link.joint.name: place for place, link in enumerate(self._links)}
         columns = {degree.link: degree.column for degree in robot.degrees}
-        # By link: the column that moves its joint, and what of it; -1 where the leader of a joint stays at 0.
+        # By link: the column that moves its joint, with multiplier and offset; -1 where the joint's leader stays at 0.
         self._driven = {place: (column, 1.0, 0.0) for place, column in columns.items()}
         for name, mimic in robot.mimics.items():
             column = columns.get(names[mimic.leader], -1)
@@ -93,7 +93,7 @@ def _matrix(q: Numbers) -> Numbers:
 
 
 def _moved(position: Numbers, matrix: Numbers, vector: Array) -> Numbers:
-    """The position plus the vector, which the matrix turns first."""
+    """The position plus the vector after rotation by the matrix."""
     x, y, z = vector.tolist()
     if not vector.any():
         return position

@@ -1,4 +1,4 @@
-"""The page of an audit: the worst pose of each pair of links that overlaps, a frame each."""
+"""The page of an audit: one frame for each pair of links that overlaps, with its worst pose."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from overlapper.audit.robot import Robot, shape_keys
 
 Color = tuple[float, float, float, float]
 
-MOST = 100  # poses that a page has at most, so that it opens at once
+MOST = 100  # the most poses of a page, so that it opens quickly
 
 SHARED = "#ff4fa3"  # a colour that the links do not have
 
 
 def shown(audit: Audit) -> list[PairAudit]:
-    """The pairs that a page shows, the largest volume first: they overlap, and are not adjacent."""
+    """The pairs that a page shows, the largest volume first: all pairs that overlap and are not adjacent."""
     met = [each for each in audit.pairs if each.largest and not each.pair.adjacent]
     return sorted(met, key=_volume, reverse=True)[:MOST]
 
 
 def addresses(audit: Audit, path: Path) -> dict[tuple[int, int], str]:
-    """By pair of links, what opens the page at its pose."""
+    """For each pair of links, the link that opens the page at its pose."""
     return {each.pair.links: f"{path.name}#t={frame}" for frame, each in enumerate(shown(audit))}
 
 
 def write_page(audit: Audit, path: Path) -> None:
-    """A page of the poses in which pairs share most, or of the rest pose if no pair shares anything.
+    """Write a page with the pose of the largest volume of each pair, or the rest pose if no pair overlaps.
 
     ImportError without meshcat.
     """
@@ -57,7 +57,7 @@ def _caption(audited: PairAudit) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _DrawnRobot:
-    """The bodies, as views are given them."""
+    """The bodies in the form that views take."""
 
     keys: list[tuple[int, int, int]]
     placed: list[Placed]
@@ -66,7 +66,7 @@ class _DrawnRobot:
 
 
 class _Scene:
-    """A robot to be drawn in one pose after the other, each link in a colour of its own."""
+    """A robot to be drawn in one pose after another, each link in its own colour."""
 
     def __init__(self, robot: Robot) -> None:
         self._kinematics = Kinematics(robot)
@@ -75,7 +75,7 @@ class _Scene:
         links = sorted({key[:2] for key in self._keys})
         # Hues a golden ratio apart stay distinct however many links there are.
         self._colors = {link: (*colorsys.hsv_to_rgb(0.618034 * k % 1, 0.35, 0.85), 1.0) for k, link in enumerate(links)}
-        # A slash would make two names of one, of a body and its link.
+        # A slash would split the name into the name of a body and the name of its link.
         names = [name.replace("/", ".") for name in robot.link_names]
         self._names = {
             (body, link): f"{robot.tree.bodies[body].replace('/', '.')}/{names[link]}" for body, link in links

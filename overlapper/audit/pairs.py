@@ -1,4 +1,4 @@
-"""Which pairs of links of a robot are asked for, and how they hang together."""
+"""The pairs of links of a robot that are tested, and how joints connect them."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from overlapper.audit.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class LinkPair:
-    """Two links of a body with shapes, by their places, the lesser first.
+    """Two links of a body with shapes, by their indices, the smaller index first.
 
-    They are `adjacent` if a joint ties them, or joints and links without shapes alone. They are `rigid` if no joint
-    between them can be moved.
+    The links are `adjacent` if a joint connects them, or a chain of joints and links without shapes. They are `rigid`
+    if no joint between them can be moved.
     """
 
     links: tuple[int, int]
@@ -34,7 +34,7 @@ def link_pairs(robot: Robot) -> list[LinkPair]:
 
 
 def _neighbours(robot: Robot) -> dict[int, set[int]]:
-    """By link: those that it is adjacent to. Through a link without a shape, all its neighbours are."""
+    """The adjacent links of each link. All neighbours of a link without a shape are adjacent to each other."""
     links = robot.tree.links
     shaped = {shape.link for shape in robot.tree.shapes} | {i for i, link in enumerate(links) if link.skipped}
     near: dict[int, set[int]] = {place: set() for place in range(len(links))}

@@ -1,4 +1,4 @@
-"""A robot: its kinematic tree, and which of its joints can be moved at will and how far."""
+"""A robot: its kinematic tree, the joints that can be moved independently, and their ranges."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from overlapper.simulation.bullet.model_text import root_of
 from overlapper.simulation.kinematic_tree import KinematicTree, Mimic
 from overlapper.simulation.settings import Modelling
 
-TURN = ("x", "y", "z", "w")  # of a spherical joint
+TURN = ("x", "y", "z", "w")  # the quaternion of a spherical joint
 
 
 @dataclass(frozen=True, slots=True)
 class Degree:
-    """A joint that is moved at will: that of the link in that place, by the number in column `column`.
+    """A joint that is moved independently: the joint of link number `link`. Column `column` has its value.
 
-    It goes from `lower` to `upper`, in rad or m, or, if it is "endless", once around. A "spherical" one has four
-    columns, a unit quaternion xyzw.
+    The value goes from `lower` to `upper`, in rad or m. An "endless" joint turns once around. A "spherical" joint has
+    four columns, a unit quaternion xyzw.
     """
 
     link: int
@@ -49,10 +49,10 @@ class Degree:
 
 @dataclass(frozen=True)
 class Robot:
-    """Links, shapes and joints as pybullet has read them; `mimics` has, by name, the joints that follow others.
+    """Links, shapes and joints as they were read. `mimics` has the joints that follow others, by name.
 
-    `name` is that of the robot in the file, or else of its first body. `notes` are sentences on what of the file is not
-    read.
+    `name` is the robot's name in the file, or else the name of its first body. `notes` are sentences on the parts of
+    the file that are not read.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Robot:
 
     @cached_property
     def link_names(self) -> tuple[str, ...]:
-        """A distinct name for each link: after its body if there are several, and with its place if two are equal."""
+        """Distinct names of the links: with the body's name if there are several, with the index if names are equal."""
         links = self.tree.links
         names = [
             f"{self.tree.bodies[link.body]}/{link.name}" * (len(self.tree.bodies) > 1) or link.name for link in links
@@ -71,7 +71,7 @@ class Robot:
 
     @cached_property
     def degrees(self) -> tuple[Degree, ...]:
-        """The joints that are moved at will. Those that nothing bounds, prismatic ones without limits, are not."""
+        """The joints that are moved independently. Prismatic joints without limits are not moved."""
         found: list[Degree] = []
         column = 0
         for place, link in enumerate(self.tree.links):
@@ -95,18 +95,18 @@ class Robot:
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """The names of the numbers of a configuration: joints, or parts of their quaternions."""
+        """The names of the numbers of a configuration: joints, or components of their quaternions."""
         return tuple(column for degree in self.degrees for column in degree.columns)
 
     @property
     def unmoved(self) -> list[tuple[str, str]]:
-        """Joints that could move and do not: what kind of joint, and its name."""
+        """The kind and the name of each joint that could move but is not moved."""
         moved = {degree.name for degree in self.degrees} | self.mimics.keys()
         joints = [link.joint for link in self.tree.links if link.joint.name not in moved]
         return [(joint.kind, joint.name) for joint in joints if joint.kind != "held"]
 
     def drivers(self, place: int) -> frozenset[int]:
-        """The links between the base and the link in that place, itself among them, whose joints move."""
+        """The links from the base to link number `place`, this link included, whose joints move."""
         moved = {degree.link for degree in self.degrees}
         found = set()
         while place >= 0:
@@ -118,7 +118,7 @@ class Robot:
 
 
 def shape_keys(robot: Robot) -> NDArray[np.int64]:
-    """(k, 3) body, place of the link among all links, and place within it of each shape."""
+    """(k, 3): for each shape its body, the index of its link among all links, and its index within the link."""
     seen: Counter[int] = Counter()
     keys = []
     for shape in robot.tree.shapes:
@@ -128,16 +128,16 @@ def shape_keys(robot: Robot) -> NDArray[np.int64]:
 
 
 def not_modelled(robot: Robot) -> dict[str, str]:
-    """By the name of a link, which of its shapes are not modelled and why."""
+    """For each link with shapes that are not modelled, by its name: which shapes, and why."""
     return {name: link.skipped for name, link in zip(robot.link_names, robot.tree.links) if link.skipped}
 
 
 def read_robot(path: Path, modelling: Modelling = Modelling()) -> Robot:  # noqa: B008
     """The robot of a URDF, SDF or MJCF file.
 
-    MuJoCo's own compiler reads MJCF if it is installed, else pybullet. pybullet passes over mimic joints: those of a
-    URDF are read from its text. NotRead if the reader refuses the file, or pybullet takes it for something else than it
-    says, or if a joint mimics one that is not there or, in the end, itself.
+    MuJoCo's compiler reads MJCF if it is installed, else pybullet does. pybullet ignores mimic joints, so those of a
+    URDF are read from its text. NotRead if the reader refuses the file, or if pybullet reads something else than the
+    file says. NotRead also if a joint mimics a joint that does not exist, or mimics itself through others.
     """
     if path.suffix.lower() == ".xml" and find_spec("mujoco"):
         return _compiled(path, modelling)
@@ -169,7 +169,7 @@ _reading = Confined(SECONDS, MEGABYTES)
 
 
 def _answers(request: tuple[Path, Modelling]) -> Generator[Robot | str, None, None]:
-    """In the process in which pybullet reads the file: the robot in it, or the reason why it cannot be read."""
+    """Runs in the process in which pybullet reads the file: yields the robot, or why the file cannot be read."""
     path, modelling = request
     try:
         root = root_of(path)
@@ -200,7 +200,7 @@ def _mimics(root: ElementTree.Element, tree: KinematicTree) -> dict[str, Mimic]:
 
 
 def _followed(name: str, mimics: Mapping[str, Mimic]) -> Mimic:
-    """The same with a leader that follows none."""
+    """The equivalent mimic whose leader does not mimic another joint."""
     mimic, passed = mimics[name], {name}
     while mimic.leader in mimics:
         if mimic.leader in passed:

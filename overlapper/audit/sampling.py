@@ -1,7 +1,7 @@
-"""Which configurations of a robot are looked at: its rest pose, corners of its limits, then any at random.
+"""The configurations of a robot that an audit tests: the rest pose, corners of the joint limits, then random ones.
 
-Each is known by its number, and drawn by a generator of the block that it is in. It is the same whoever looks at which
-blocks in which order.
+Each configuration has a number and is drawn by the random generator of its block. It does not depend on which process
+tests which blocks in which order.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from overlapper.audit.robot import Degree, Robot
 Array = NDArray[np.float64]
 
 BLOCK = 4096  # configurations that are drawn at once
-ALL_CORNERS = 8  # joints with limits, of which all corners are looked at: 256
-SOME_CORNERS = 256  # of more joints, drawn at random
+ALL_CORNERS = 8  # the most joints with limits for which all corners (256) are tested
+SOME_CORNERS = 256  # corners drawn at random if there are more joints
 
 
 class Sampling:
-    """`count` configurations of a robot, as many columns each as `robot.columns` names.
+    """`count` configurations of a robot, each with the columns `robot.columns`.
 
-    Number 0 is the rest pose, in which joints are at 0, or halfway between their limits if these exclude it. Then come
-    corners, in which all joints with limits are at one of them. They are all corners or, with more than 8 such joints,
-    each joint alone at either limit and 256 corners at random. Those from `first_random` on are drawn uniformly between
-    the limits, once around where a joint has none, and over all orientations of a spherical joint. ValueError if
-    `count` is less than 1 or `seed` less than 0.
+    Number 0 is the rest pose: joints are at 0, or halfway between their limits if the limits exclude 0. Then come
+    corners, in which all joints with limits are at one of their limits. These are all corners or, with more than 8 such
+    joints, each joint alone at either limit and 256 random corners. The configurations from `first_random` on are drawn
+    uniformly: between the limits, once around for a joint without limits, and over all orientations of a spherical
+    joint. ValueError if `count` is less than 1 or `seed` less than 0.
     """
 
     def __init__(self, robot: Robot, count: int, seed: int) -> None:
@@ -40,7 +40,7 @@ class Sampling:
         self.first_random = len(self._placed)
         drawn = range(self.first_random, count, BLOCK)
         self.blocks = [range(self.first_random)] + [range(start, min(start + BLOCK, count)) for start in drawn]
-        """The numbers of the configurations, block by block; the first are those that are not random."""
+        """The numbers of the configurations, block by block. The first block has those that are not random."""
 
     def block(self, number: int) -> Array:
         """(n, m): the configurations of a block."""
@@ -60,7 +60,7 @@ class Sampling:
         return np.asarray(np.array(columns).reshape(-1, len(random)).T)
 
     def configuration(self, number: int) -> Array:
-        """(m,): that of this number."""
+        """(m,): the configuration with this number."""
         place = next(place for place, block in enumerate(self.blocks) if number in block)
         return np.asarray(self.block(place)[number - self.blocks[place].start])
 
@@ -89,12 +89,12 @@ def _at_rest(degree: Degree) -> tuple[float, ...]:
 
 
 def _draws(degree: Degree) -> int:
-    """How many random numbers a joint takes."""
+    """The number of random numbers that a joint needs."""
     return 3 if degree.range == "spherical" else 1
 
 
 def _any_turn(a: Array, b: Array, c: Array) -> list[Array]:
-    """Quaternions xyzw, uniform over all turns, of numbers in 0..1 (K. Shoemake, "Uniform random rotations", 1992)."""
+    """Uniform random quaternions xyzw, from numbers in 0..1 (K. Shoemake, "Uniform random rotations", 1992)."""
     inner, outer = np.sqrt(1 - a), np.sqrt(a)
     b, c = 2 * np.pi * b, 2 * np.pi * c
     return [inner * np.sin(b), inner * np.cos(b), outer * np.sin(c), outer * np.cos(c)]

@@ -1,4 +1,4 @@
-"""The pairs of links that a planner need not ask about: as SRDF, for MoveIt, or as MJCF, for MuJoCo."""
+"""The pairs of links that a planner need not test: as SRDF, for MoveIt, or as MJCF, for MuJoCo."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Names = frozenset[str]
 
 
 def reason(audited: PairAudit, whole: bool) -> str | None:
-    """Why a pair need not be asked about; None if it must be, as a pair of links that are not modelled `whole`."""
+    """Why a pair need not be tested; None if it must be. "Never" requires that both links are modelled `whole`."""
     if audited.pair.adjacent:
         return "Adjacent"
     if audited.status == "never" and not whole:
@@ -26,7 +26,7 @@ def reason(audited: PairAudit, whole: bool) -> str | None:
 def write_srdf(audit: Audit, path: Path) -> None:
     """Write <disable_collisions> for each pair that is adjacent, never overlaps or always does.
 
-    A pair of a link that is not modelled whole is not said never to overlap.
+    A pair with a link that is not modelled completely is not written as never overlapping.
     """
     root = ElementTree.Element("robot", name=audit.robot.name)
     for (first, second), why in _disabled(audit):
@@ -44,7 +44,7 @@ def write_excludes(audit: Audit, path: Path) -> None:
 
 
 def _disabled(audit: Audit) -> Iterator[tuple[tuple[str, str], str]]:
-    """The pairs that need not be asked about, by name, and why."""
+    """The pairs that need not be tested, by name, and why."""
     partial = not_modelled(audit.robot).keys()
     for audited in audit.pairs:
         if why := reason(audited, partial.isdisjoint(audited.names)):
@@ -60,7 +60,7 @@ def _write(root: ElementTree.Element, path: Path) -> None:
 
 
 def read_srdf(path: Path) -> dict[Names, str]:
-    """The pairs that an SRDF file disables, with its reasons. OSError if it is not there, ValueError if it is none."""
+    """The pairs that an SRDF file disables, with its reasons. OSError if the file is missing, ValueError if invalid."""
     if path.exists() and not path.is_file():
         raise ValueError(f"{path} is no SRDF, and no file")
     try:

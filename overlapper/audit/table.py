@@ -1,4 +1,4 @@
-"""An audit as a table, a row for each pair of links, and as what JSON takes."""
+"""An audit as a table with a row for each pair of links, and as values for JSON."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from overlapper.tables.table import Row, Value
 from overlapper.tables.table_file import TABLES, origin
 
 # Every column, in order, with its type; the unit is in the name. `adjacent` is 1 or 0. Joints are JSON, by name, in rad
-# and m. `page` is a link to the pose of the largest volume. `not_modelled` says what of the two links is left out.
+# and m. `page` links to the pose of the largest volume. `not_modelled` says which shapes of the links are left out.
 COLUMNS: dict[str, type] = {
     "nameA": str,
     "nameB": str,
@@ -37,7 +37,7 @@ COLUMNS: dict[str, type] = {
 
 
 def write_table(audit: Audit, path: Path, settings: Mapping[str, Any], page: Mapping[tuple[int, int], str]) -> None:
-    """Write a row for each pair of links; `page` has, by pair of links, where a page shows them.
+    """Write a row for each pair of links. `page` has the link to the page's frame for each pair.
 
     OSError if the file cannot be written.
     """
@@ -52,7 +52,7 @@ def write_table(audit: Audit, path: Path, settings: Mapping[str, Any], page: Map
 
 
 def facts(audit: Audit, page: Mapping[tuple[int, int], str]) -> list[dict[str, Any]]:
-    """The rows as JSON takes them; joints are objects."""
+    """The rows as values for JSON; joints are objects."""
     made = []
     for audited in audit.pairs:
         row: dict[str, Any] = dict(_row(audit, audited, page))

@@ -32,9 +32,9 @@ class Largest:
 class Tally:
     """Counts of configurations, (p,) each, per pair of links.
 
-    A pair was `asked` for in so many configurations and overlapped in `met` of them. `random_asked` and `random_met`
-    count the random configurations alone. `volume` is in m³, summed over pairs of shapes. `depth` is in m, of the
-    deepest pair of shapes.
+    A pair was tested in `asked` configurations and overlapped in `met` of them. `random_asked` and `random_met` count
+    only the random configurations. `volume` is in m³, summed over pairs of shapes. `depth` is in m, of the deepest pair
+    of shapes.
     """
 
     asked: Counts
@@ -51,7 +51,7 @@ class Tally:
         return cls(zero, zero, zero, zero, nothing, nothing)
 
     def __add__(self, other: Tally) -> Tally:
-        """The sum, which does not depend on the order of tallies."""
+        """The sum of two tallies. The sum of several does not depend on their order."""
         return Tally(
             self.asked + other.asked,
             self.met + other.met,
@@ -64,7 +64,7 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class ShapeOverlaps:
-    """Overlaps of shapes: the place of the pair of links, the place of the configuration, volume and depth of each."""
+    """Overlaps of shapes: for each the index of the pair of links, the index of the configuration, volume and depth."""
 
     pairs: Counts
     rows: Counts
@@ -72,7 +72,7 @@ class ShapeOverlaps:
     depths: Array
 
     def tally(self, asked: NDArray[np.bool_], numbers: Counts, first_random: int) -> Tally:
-        """The tally of the configurations `numbers` (n,), in which the pairs `asked` (p,) were asked for.
+        """The tally of the configurations `numbers` (n,), in which the pairs `asked` (p,) were tested.
 
         Links of several shapes may overlap several times in one configuration.
         """

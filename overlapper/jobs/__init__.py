@@ -1,1 +1,1 @@
-"""Work done by other processes, here or on a cluster, whether one of them raises, hangs or dies."""
+"""Work in other processes, here or on a cluster. It goes on if one of them raises, hangs or dies."""

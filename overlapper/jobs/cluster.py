@@ -1,8 +1,8 @@
-"""The executor of many machines: shares of items as tasks of Ray, each done by hands beside Ray's own process.
+"""The executor of many machines: shares of items are tasks of Ray, each done by hands beside Ray's own process.
 
-An item that raises, hangs or dies is the business of a hand, as on one machine. A node that is lost loses the shares
-that were under way there, and these are sent once more. On a large cluster a share is for several CPUs of a node, and
-lasts longer: whoever started the job has to do with hundreds of shares at a time, and with hundreds a second.
+A hand deals with items that raise, hang or die, as on one machine. If a node is lost, the shares that were under way
+there are sent again. On a large cluster a share is for several CPUs of a node and lasts longer, so that the process
+that started the job handles only hundreds of shares at a time and hundreds a second.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ from overlapper.jobs.worker import NotStarted
 from overlapper.printable import first_line
 
 SHARE = 1.0  # s of work that are sent at once: a task of Ray costs some milliseconds
-RATE = 100  # shares that come back in a second, at most: on more crews, shares last longer
+RATE = 100  # the most shares that come back in a second: with more crews, shares last longer
 
-CREWS = 500  # shares that are done at a time, at most: on more CPUs, each is for several
+CREWS = 500  # the most shares that are done at a time: with more CPUs, each share is for several
 
-# Shares that may be lost before the first one is done: beyond, the installation is broken. Later, as many more as are
-# sent: a large part of the cluster may go at once.
+# The most shares that may be lost before the first one is done; if more are lost, the installation is broken. Later, as
+# many more may be lost as are sent, because a large part of the cluster may go at once.
 LOSSES = 20
 
 
 class Cluster:
-    """Does items on a Ray cluster, that at `address` ("auto", or host:port), or one of this machine.
+    """Does items on the Ray cluster at `address` ("auto", or host:port), or on a new cluster of this machine.
 
-    `workers` is how many items at a time, by default as many as the cluster has CPUs, now and later. NotStarted if
-    there is no cluster, ImportError without Ray.
+    `workers` is the number of items at a time. The default is the number of CPUs of the cluster, which may change.
+    NotStarted if there is no cluster, ImportError without Ray.
     """
 
     def __init__(self, address: str | None = None, workers: int | None = None) -> None:
-        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # what it is used for is nobody's business
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # for privacy: Ray must not report its use
         try:
             import ray
         except ImportError as error:
@@ -58,11 +58,11 @@ class Cluster:
 
     @property
     def workers(self) -> int:
-        """How many at a time, as the cluster is now."""
+        """The number of items at a time on the present cluster."""
         return self._asked or max(int(self._ray.cluster_resources().get("CPU", 1)), 1)
 
     def _crew(self) -> int:
-        """The CPUs for a share: as many as keep the number of shares small, and as most nodes have."""
+        """The CPUs for a share: enough to keep the number of shares small, and not more than most nodes have."""
         cpus = [int(node["Resources"].get("CPU", 0)) for node in self._ray.nodes() if node["Alive"]]
         most = median_low([each for each in cpus if each] or [1])
         return min(math.ceil(self.workers / CREWS), most)
@@ -73,7 +73,7 @@ class Cluster:
         """See Executor."""
         ray, crew = self._ray, self._crew()
         crews = max(self.workers // crew, 1)
-        # Those that are lost are sent anew by us, who know what has arrived.
+        # Ray must not retry: this process sends lost shares again, because it knows what has arrived.
         remote = ray.remote(num_cpus=crew, max_retries=0)(_work)
         shares = Shares(len(items), crews, crew * max(SHARE, crews / RATE), crew)
         under_way: dict[Any, list[int]] = {}
@@ -82,7 +82,8 @@ class Cluster:
         sent = ray.put(job)
         try:
             while True:
-                # Twice the shares that can be done at a time, so that nobody waits for the next. The cluster may grow.
+                # Twice the shares that can be done at a time, so that no crew waits for its next share. The cluster
+                # may grow.
                 most = 2 * max(self.workers // crew, 1)
                 while len(under_way) < most and (share := shares.take()):
                     reference = remote.remote(sent, [items[number] for number in share], limit, crew)
@@ -112,13 +113,15 @@ class Cluster:
                 ray.cancel(reference, force=True)
 
     def close(self) -> None:
-        """Leave the cluster; one that was started here ends."""
+        """Leave the cluster. A cluster that was started here ends."""
         self._ray.shutdown()
 
 
 class _Crew:
-    """The hands of a process of Ray's, which are kept for the next share. Their threads are, too: a hand ends with the
-    thread that has started it."""
+    """The hands of a process of Ray. They are kept for the next share.
+
+    Their threads are kept, too, because a hand ends with the thread that started it.
+    """
 
     def __init__(self, job: Job, limit: float | None, count: int) -> None:
         self.job, self.limit, self.count = job, limit, count
@@ -151,7 +154,7 @@ _crew: _Crew | None = None
 
 
 def _work(job: Job, items: Sequence[Any], limit: float | None, hands: int) -> tuple[Any, int, float]:
-    """A share: what the job gathers of it, how many items were done, and the seconds that they took."""
+    """Do a share. Returns the gathered result, the number of items that were done, and the seconds that they took."""
     global _crew
     if _crew is None or (_crew.job, _crew.limit, _crew.count) != (job, limit, hands):
         if _crew:

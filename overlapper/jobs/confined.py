@@ -1,8 +1,8 @@
-"""Functions called in a process of their own, with limits of time and memory. The answer is a result or a sentence.
+"""Functions called in a separate process, with limits of time and memory. The answer is a result or a sentence.
 
-The process is kept for the next call, as its start takes longer than most calls. A call that breaks a limit ends the
-process and all that it has started; so does the end of Python. An idle process ends after some seconds. On Windows
-there is no limit of memory, and the process stays until Python ends.
+The process is kept for the next call, because its start takes longer than most calls. The process and all its children
+end if a call breaks a limit, and when Python ends. An idle process ends after some seconds. On Windows there is no
+limit of memory, and the process stays until Python ends.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from overlapper.printable import first_line
 P = ParamSpec("P")
 T = TypeVar("T")
 
-# Limits of what reads files from outside: far beyond what a file of this world takes, so that only those meet them that
-# would never end.
+# The limits for reading files from outside. They are far beyond what real files need, so that only reading that would
+# never end reaches them.
 SECONDS = 600.0
 MEGABYTES = 8192
 
-IDLE = 20  # s after which a process that nobody calls ends
-GRACE = 2  # s beyond the limit after which a process ends itself, as nobody waits for it any more
+IDLE = 20  # s after which an idle process ends
+GRACE = 2  # s beyond the limit after which a process ends itself, because nobody waits for it any more
 
 OUT_OF_MEMORY = re.compile(r"bad_alloc|MemoryError|[Cc]annot allocate memory|[Oo]ut of memory")
 
@@ -52,7 +52,7 @@ class _OutOfMemory(Exception):
 class Confined:
     """Calls functions of modules in one process, each within `seconds`, and with `megabytes` (2**20 bytes) of memory.
 
-    Threads take turns. Whoever forks gets a process of his own.
+    Threads take turns. After a fork, the child uses a new process.
     """
 
     def __init__(self, seconds: float, megabytes: int) -> None:
@@ -62,7 +62,7 @@ class Confined:
         self._owner = os.getpid()
 
     def __call__(self, function: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
-        """Call the function there. Unanswered if it breaks a limit or ends its process."""
+        """Call the function in the process. Unanswered if the call breaks a limit or ends the process."""
         if self._owner != os.getpid():
             self._owner, self._lock, self._worker = os.getpid(), threading.Lock(), None
         with self._lock:
@@ -72,7 +72,7 @@ class Confined:
         return cast(T, value)
 
     def close(self) -> None:
-        """End the process; another call starts a new one."""
+        """End the process. Another call starts a new one."""
         if self._worker and self._owner == os.getpid():
             self._worker.close()
         self._worker = None
@@ -87,10 +87,10 @@ class Confined:
             returned, value = self._worker.receive(self.seconds)
         except Ended as ended:
             self.close()
-            if kept and sys.platform != "win32" and ended.code == -signal.SIGALRM:  # it had just been idle for too long
+            if kept and sys.platform != "win32" and ended.code == -signal.SIGALRM:  # it had been idle for too long
                 return self._ask(request)
             raise self._unanswered(ended) from None
-        except BaseException:  # Ctrl-C: its answer would be taken for that of the next call
+        except BaseException:  # Ctrl-C: a late answer would be taken for the answer to the next call
             self.close()
             raise
         if isinstance(value, _OutOfMemory):
@@ -110,12 +110,12 @@ class Confined:
 
 
 def out_of_memory(ended: Ended) -> bool:
-    """Whether a process ended as it was refused memory, by its last words."""
+    """Whether a process ended because it was refused memory, according to its last words."""
     return OUT_OF_MEMORY.search(ended.words) is not None
 
 
 def answers(request: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any], float]) -> Iterator[tuple[bool, Any]]:
-    """In the process: whether a function returned, and what it returned or raised."""
+    """Runs in the process: yields whether a function returned, and what it returned or raised."""
     function, arguments, named, seconds = request
     forget_words()
     _end_after(math.ceil(seconds) + GRACE)
@@ -133,7 +133,7 @@ def _outcome(function: Callable[..., Any], arguments: tuple[Any, ...], named: di
 
 
 def _portable(error: Exception) -> Exception:
-    """The same error if it can be sent, and else one of its words."""
+    """The same error if it can be pickled, or else an error with the same text."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:
@@ -142,6 +142,6 @@ def _portable(error: Exception) -> Exception:
 
 
 def _end_after(seconds: int) -> None:
-    """End this process then, even if it does not come back from C."""
+    """End this process after `seconds`, even if it does not return from C code."""
     if sys.platform != "win32":
         signal.alarm(seconds)

@@ -1,4 +1,4 @@
-"""All that a process has started and that must end with it: its group, and on Linux what has left the group."""
+"""The processes that must end with a process: its process group and, on Linux, descendants that have left the group."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ import sys
 from pathlib import Path
 from uuid import uuid4
 
-MARK = "OVERLAPPER_WORKER"  # a variable of the environment, which all that a process starts inherits
+MARK = "OVERLAPPER_WORKER"  # a variable of the environment, which all descendants of a process inherit
 
 DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
 MOST_FILES = 4096
-KILLINGS = 100  # how often processes are looked for, as they may start others meanwhile
+KILLINGS = 100  # the most searches for processes: they may start others meanwhile
 
 
 def new_mark() -> str:
-    """The mark of a new process and of all that it starts; it begins with the mark of this process."""
+    """The mark of a new process and its descendants. It begins with the mark of this process."""
     return f"{os.environ.get(MARK, '')}/{uuid4().hex}"
 
 
 def kill_group(leader: int) -> None:
-    """Kill what a process has started, and the process itself. Windows has no such groups."""
+    """Kill a process and all processes in its group. Windows has no such groups."""
     if sys.platform != "win32":
         with contextlib.suppress(ProcessLookupError, PermissionError):  # macOS refuses it for a process that has ended
             os.killpg(leader, signal.SIGKILL)
 
 
 def kill_marked(mark: str) -> None:
-    """Kill all processes that have the mark but this one, wherever they are. Only Linux tells of them."""
+    """Kill all processes with the mark except this one, in whatever group. Only Linux can list them."""
     if sys.platform == "linux":
         for _ in range(KILLINGS):
             if not _found_and_killed(mark.encode()):
@@ -41,7 +41,7 @@ def _found_and_killed(mark: bytes) -> bool:
     found = False
     for environment in Path("/proc").glob("[0-9]*/environ"):
         process = int(environment.parent.name)
-        with contextlib.suppress(OSError):  # of other users, and of what has just ended
+        with contextlib.suppress(OSError):  # processes of other users, and processes that have just ended
             if process != os.getpid() and mark in environment.read_bytes():
                 os.kill(process, signal.SIGKILL)
                 found = True
@@ -49,13 +49,13 @@ def _found_and_killed(mark: bytes) -> bool:
 
 
 def signalled_at_the_end_of_the_parent(number: int) -> None:
-    """Let Linux send this process a signal when the thread that has started it ends."""
+    """Let Linux send this process a signal when the thread that started it ends."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(DIE_WITH_PARENT, number)
 
 
 def guard() -> None:
-    """Start a process that does nothing but wait for the end of this one, however it ends, and kill what it leaves."""
+    """Start a process that only waits for the end of this one, however it ends, and kills its descendants."""
     if sys.platform != "linux" or not (mark := os.environ.get(MARK)):
         return
     guarded = os.getpid()

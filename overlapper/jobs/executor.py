@@ -1,4 +1,4 @@
-"""The protocol of executors, which do the items of a job: processes of this machine, or a cluster."""
+"""The protocol of executors. An executor does the items of a job by processes of this machine or on a cluster."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from overlapper.jobs.hand import Job, Outcome
 from overlapper.jobs.patience import Late
 
-# The numbers of some items, and what the job gathers of them.
+# The numbers of some items, and the result that the job gathers from them.
 Shared = tuple[list[int], Any]
 
 
@@ -18,17 +18,17 @@ class Executor(Protocol):
 
     @property
     def workers(self) -> int:
-        """How many at a time."""
+        """The number of items at a time."""
         ...
 
     def shares(
         self, job: Job, items: Sequence[Any], limit: float | None = None, late: Late | None = None
     ) -> Generator[Shared, None, None]:
-        """The numbers of some items with what the job gathers of them, in whatever order, each item once.
+        """Yields the numbers of some items with the result that the job gathers from them. Each item comes once.
 
-        `limit` is the number of seconds that an item may take. `late` hears of items that take very long. Items that
-        are under way when the generator is closed are given up, and no process is left. NotStarted if the job cannot be
-        done at all.
+        The order of items is not defined. `limit` is the number of seconds that an item may take. `late` is called for
+        items that take very long. Closing the generator abandons items that are under way and leaves no process.
+        NotStarted if the job cannot be done at all.
         """
         ...
 
@@ -36,7 +36,7 @@ class Executor(Protocol):
 def outcomes(
     engine: Executor, job: Job, items: Sequence[Any], limit: float | None = None
 ) -> Generator[tuple[int, Outcome], None, None]:
-    """The number of each item with what became of it, of a job that gathers nothing. See Executor.shares."""
+    """The number and the outcome of each item of a job that gathers nothing. See Executor.shares."""
     with closing(engine.shares(job, items, limit)) as shares:
         for numbers, found in shares:
             yield from zip(numbers, found)

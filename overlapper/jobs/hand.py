@@ -1,6 +1,6 @@
-"""A process that does items one after the other, and may raise, hang or die of one without harm to the others.
+"""A process that does items one after another. If it raises, hangs or dies on an item, other items are not affected.
 
-What is done is a `Job`, and nothing here knows of scenes.
+The work is a `Job`. Nothing here depends on scenes.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from overlapper.jobs.surroundings import Surroundings
 from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker, forget_words
 from overlapper.printable import encodable, first_line, shortened
 
-# s that a process has beyond the limit to end itself, which it does with a traceback.
+# s beyond the limit in which a process ends itself with a traceback, before it is killed.
 GRACE = 10.0
 
-# An item fails once its process has died this often: the first time, somebody else may have killed the process.
+# An item fails if its process has died this often. The first death may have another cause than the item.
 TRIES = 2
 
 TRACEBACK = 20_000  # characters
 
-TIMED_OUT = re.compile(r"^Timeout \(\d", re.MULTILINE)  # of faulthandler
+TIMED_OUT = re.compile(r"^Timeout \(\d", re.MULTILINE)  # the message of faulthandler
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
     """The function to call with every item. `prepare`, named by module and name, makes it from `setup` in each process.
 
-    It must find the same bits of an item in whatever process, after whatever others. Paths are meant from `folder`,
-    where there is such a folder. `gather`, of the same module, makes one result of `setup` and some items, each with
-    its outcome. It is called where these were done, before the result is sent. `megabytes` is the memory that a process
-    may take beyond that of a new one, on Linux.
+    The function must return the same bits for an item in any process and after any other items. Paths are relative to
+    `folder`, if it exists there. `gather`, of the same module, makes one result of `setup` and some items with their
+    outcomes. It is called in the process that did the items, before the result is sent. `megabytes` is the memory that
+    a process may take beyond the memory of a new process, on Linux.
     """
 
     module: str
@@ -54,7 +54,7 @@ class Job:
     megabytes: int | None = None
 
     def gathered(self, found: Sequence[tuple[Any, Outcome]]) -> Any:
-        """The result of some items; the outcomes themselves if nothing gathers them."""
+        """The result of some items; their outcomes if the job has no `gather`."""
         if self.gather is None:
             return [outcome for _, outcome in found]
         return getattr(import_module(self.module), self.gather)(self.setup, found)
@@ -73,7 +73,7 @@ What = Literal["raised", "hung", "died"]
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """An item without a result: a sentence, and all that is known of where it failed."""
+    """An item without a result: a sentence, and all that is known about the place of the failure."""
 
     what: What
     sentence: str
@@ -94,7 +94,7 @@ _surroundings: Surroundings | None = None
 
 
 def answers(request: Job | _Work) -> Iterator[Outcome | str]:
-    """The process: what is wrong with a job, or nothing; an outcome for each item of some work."""
+    """Runs in the process. Yields what is wrong with a job, or nothing; for work, an outcome for each item."""
     global _call
     if isinstance(request, Job):
         yield _begun(request)
@@ -108,8 +108,8 @@ def answers(request: Job | _Work) -> Iterator[Outcome | str]:
 
 def _begun(job: Job) -> str:
     global _call, _surroundings
-    # Whoever asks may be killed while this process hangs in an item. It is asked for by the thread that reads its
-    # replies, which lives as long.
+    # The parent may be killed while this process hangs in an item. The thread that started this process also reads its
+    # replies, so the thread lives as long as the process is needed.
     signalled_at_the_end_of_the_parent(signal.SIGKILL)
     faulthandler.enable()
     warnings.simplefilter("ignore")
@@ -127,11 +127,11 @@ def _outcome(call: Callable[[Any], Any], item: Any, limit: float | None) -> Outc
     forget_words()
     start = time.monotonic()
     if limit:
-        faulthandler.dump_traceback_later(limit, exit=True)  # also where C does not let Python have a turn
+        faulthandler.dump_traceback_later(limit, exit=True)  # also while C code does not return to Python
     try:
         with warnings.catch_warnings():
             return Done(call(item), time.monotonic() - start)
-    except BaseException as error:  # an exit or an interruption is the item's, too
+    except BaseException as error:  # an exit or an interruption is a failure of the item, too
         return _failed("raised", f"{type(error).__name__}: {first_line(error)}", _trace())
     finally:
         faulthandler.cancel_dump_traceback_later()
@@ -140,17 +140,17 @@ def _outcome(call: Callable[[Any], Any], item: Any, limit: float | None) -> Outc
 def _trace() -> str:
     try:
         return traceback.format_exc()
-    except BaseException as error:  # of the exception's own words
+    except BaseException as error:  # raised by the exception's own __str__
         return f"the traceback cannot be written: {type(error).__name__}"
 
 
 def _failed(what: What, sentence: str, words: str) -> Failed:
-    """A failure whose words can be written to any table, and fill none."""
+    """A failure whose texts are printable and short enough for any table."""
     return Failed(what, encodable(sentence), shortened(encodable(words), TRACEBACK))
 
 
 class Hand:
-    """Does items in a worker process, which is started anew when it has ended.
+    """Does items in a worker process, which is started again when it has ended.
 
     `limit` is the number of seconds that an item may take. NotStarted if there can be no process for the job.
     """
@@ -161,7 +161,7 @@ class Hand:
         self._closed = False
 
     def work(self, items: Sequence[Any]) -> Iterator[Outcome]:
-        """The outcome of each item, in order. If the hand is closed meanwhile, those of the first items."""
+        """The outcome of each item, in order. If the hand is closed meanwhile, the outcomes of the first items only."""
         left = deque(items)
         tries = 0
         while left and not self._closed:
@@ -203,11 +203,11 @@ class Hand:
 
     @property
     def closed(self) -> bool:
-        """Whether it does no more."""
+        """Whether the hand is closed."""
         return self._closed
 
     def stop(self) -> None:
-        """End the process from another thread than that which works, which then ends, too."""
+        """End the process, called from another thread than the thread in `work`, which then ends, too."""
         self._closed = True
         if worker := self._worker:
             worker.kill()

@@ -16,28 +16,28 @@ from overlapper.jobs.patience import Late, Patience
 from overlapper.jobs.shares import Shares
 
 SHARE = 0.2  # s of work that are sent at once
-LOOK = 1.0  # s after which items that are under way are looked at, at the latest
+LOOK = 1.0  # s: items that are under way are checked at least this often
 
-# Outcomes that may wait for whoever writes them down, so that memory is not what a slow disk fills.
+# The most outcomes that wait to be written, so that a slow disk does not fill the memory.
 WAITING = 64
 
 Report = Shared | Exception
 
 
 def cores() -> int:
-    """Those that this process may use."""
+    """The number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class Processes:
-    """Does items in so many processes of this machine, by default one for each core."""
+    """Does items in several processes of this machine, by default one for each core."""
 
     def __init__(self, workers: int | None = None) -> None:
         self._workers = workers or cores()
 
     @property
     def workers(self) -> int:
-        """How many at a time."""
+        """The number of items at a time."""
         return self._workers
 
     def shares(
@@ -68,7 +68,7 @@ class Processes:
             for hand in hands:
                 hand.stop()
             while any(thread.is_alive() for thread in threads):
-                with suppress(queue.Empty):  # whoever waits to report goes on
+                with suppress(queue.Empty):  # lets threads go on that wait to report
                     reports.get(timeout=0.01)
 
 
@@ -81,7 +81,7 @@ def _serve(
                 reports.put(([number for number, _, _ in found], job.gathered([each[1:] for each in found])))
             if hand.closed:
                 return
-    except Exception as error:  # whoever waits for reports must hear of it
+    except Exception as error:  # the thread that waits for reports must get the error
         reports.put(error)
     finally:
         patience.end(hand)
@@ -91,7 +91,7 @@ def _serve(
 def _batches(
     hand: Hand, share: Sequence[tuple[int, Any]], shares: Shares, patience: Patience
 ) -> Iterator[list[tuple[int, Any, Outcome]]]:
-    """A share done: numbers and items with their outcomes, as many at a time as have taken SHARE together."""
+    """Do a share. Yields numbers and items with their outcomes, in batches that took about SHARE seconds each."""
     batch: list[tuple[int, Any, Outcome]] = []
     due = time.monotonic() + SHARE
     following = [*(number for number, _ in share[1:]), None]

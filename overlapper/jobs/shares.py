@@ -1,4 +1,4 @@
-"""Items handed out in shares: many at once of those that take milliseconds, and one by one near the end."""
+"""Hands out items in shares: many at once if items take milliseconds, and one by one near the end."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import threading
 from collections import deque
 from collections.abc import Sequence
 
-# Items of a share, for each that its taker does at once: the outcomes of more would fill the memory.
+# The most items of a share, for each item that its taker does at once. Outcomes of more items would fill the memory.
 LARGEST = 2_000
 
 
 class Shares:
-    """Numbers of items, to be taken by several threads in shares of about `seconds`; each is in one share only.
+    """Numbers of items, which several threads take in shares of about `seconds`. Each number is in only one share.
 
-    A share has `least` items, as long as there are any: those that its taker does at once.
+    A share has at least `least` items, as long as there are any. These are the items that its taker does at once.
     """
 
     def __init__(self, count: int, takers: int, seconds: float, least: int = 1) -> None:
@@ -24,10 +24,10 @@ class Shares:
         self._lock = threading.Lock()
 
     def take(self) -> list[int]:
-        """The next share, empty if there is no more."""
+        """The next share; empty if no items are left."""
         with self._lock:
             left = self._count - self._next + len(self._back)
-            # Nobody is to work long when all others are through. Before anything is known, a share is small.
+            # No taker should work long when all others have finished. Before any time is known, a share is small.
             fair = max(left // (2 * self._takers), 1)
             most = int(self._seconds * self._done / self._spent) if self._spent else 1
             share = []
@@ -45,6 +45,6 @@ class Shares:
             self._back.extend(numbers)
 
     def learn(self, items: int, seconds: float) -> None:
-        """So many items took so many seconds."""
+        """Record that `items` items took `seconds` seconds."""
         with self._lock:
             self._done, self._spent = self._done + items, self._spent + seconds

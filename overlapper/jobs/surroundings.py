@@ -1,4 +1,4 @@
-"""The state of a process that an item of a job may change, and that the next item finds as it was."""
+"""The state of a process that an item of a job may change, and that is restored for the next item."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import os
 import signal
 import sys
 
-REAL_TIME = 32  # the first signal of real time
+REAL_TIME = 32  # the first real-time signal
 
 
 class Surroundings:
-    """The folder, the environment and the signals of this process, as they were when it was made."""
+    """The folder, the environment and the signals of this process, as they were when this object was made."""
 
     def __init__(self) -> None:
         self._folder, self._environment = os.getcwd(), dict(os.environ)
@@ -21,7 +21,7 @@ class Surroundings:
         self._limits = _limits()
 
     def restore(self) -> bool:
-        """Put back what is not as it was, and stop timers. False if it cannot be: then the process should end."""
+        """Restore what has changed, and stop timers. False if that is not possible; then the process should end."""
         with contextlib.suppress(OSError):  # the folder is gone
             os.chdir(self._folder)
         if os.environ != self._environment:
@@ -43,13 +43,13 @@ class Surroundings:
         }
         for number, handler in others.items():
             signal.signal(number, handler)
-        if others:  # one of faulthandler's may be among them, which Python does not know
+        if others:  # a handler of faulthandler may be among them, which Python does not know
             faulthandler.disable()
         faulthandler.enable()
 
 
 def _limits() -> list[tuple[int, int]]:
-    """The limits of memory, files and time of this process, which nobody can raise again."""
+    """The limits of memory, files and time of this process. Once lowered, they cannot be raised again."""
     if sys.platform == "win32":
         return []
     import resource

@@ -1,7 +1,7 @@
-"""A worker process, in which a library may abort, crash, hang or print, and how it ended is an answer.
+"""A worker process, in which a library may abort, crash, hang or print. How the process ended is reported.
 
-The process leads a process group of its own. When it ends, all that it has started ends, too. It is not a process of
-`multiprocessing`, which would import the user's main module once more.
+The process leads its own process group. When it ends, all its descendants end, too. `multiprocessing` is not used,
+because it would import the user's main module once more.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ from typing import IO, Any
 from overlapper.jobs.descendants import MARK, guard, kill_group, kill_marked, new_mark
 from overlapper.printable import first_line
 
-START_LIMIT = 60.0  # s, for a new Python to import a module on a machine that is busy
+START_LIMIT = 60.0  # s, for a new Python to import a module on a busy machine
 
-GLANCE = 0.2  # s after which a silent process is looked at: what it has started may hold its pipe open
-LEAVE = 5.0  # s that a process has to end once it has closed its pipe
-WORDS = 1 << 16  # bytes that are kept of what a process writes to stderr, the last ones
+GLANCE = 0.2  # s after which a silent process is checked: its children may hold its pipe open
+LEAVE = 5.0  # s within which a process must end after it has closed its pipe
+WORDS = 1 << 16  # the last bytes that a process writes to stderr; this many are kept
 
 # The messages of C++ and Python for an uncaught exception.
 UNCAUGHT = r"what\(\): *(.*)|^(\w*(?:Error|Exception): .*)"
 
 END = object()
 
-_words = 2  # in the process: another number of its stderr, which nobody else closes
+_words = 2  # in the process: a duplicate descriptor of its stderr, which no other code closes
 
 
 class Ended(Exception):
-    """The process says no more; the text tells why, as the end of a sentence.
+    """The process sends no more replies. The text says why, as the end of a sentence.
 
-    `code` is its exit code, or minus the signal that ended it. It is None if the process was killed: for taking longer
-    than `limit` seconds, or for closing its pipe. `words` is the end of what it wrote to stderr.
+    `code` is the exit code, or minus the number of the signal that ended the process. It is None if the process was
+    killed because it took longer than `limit` seconds or closed its pipe. `words` is the end of its stderr.
     """
 
     def __init__(self, why: str, code: int | None, words: str = "", limit: float | None = None) -> None:
@@ -55,16 +55,15 @@ class Ended(Exception):
 
 
 class NotStarted(RuntimeError):
-    """A process that something depends on cannot be had; the text is one sentence."""
+    """A process that is needed cannot be started. The text is one sentence."""
 
 
 class Worker:
     """A process that serves requests by `answers`, a generator function of a module: a request, then its replies.
 
-    `cause` is a pattern of what the process may write to stderr, whose groups are the cause of its end. `megabytes` is
-    the memory that it may take once it has imported the module; only Linux keeps to it. Ended if there can be no such
-    process, or the module cannot be imported there. A thread reads the replies: waiting with a limit works so on every
-    system.
+    `cause` is a pattern for the stderr of the process; its groups are the cause of the end. `megabytes` is the memory
+    that the process may take after it has imported the module; only Linux enforces it. Ended if the process cannot be
+    started or cannot import the module. A thread reads the replies, so that waiting with a limit works on every system.
     """
 
     def __init__(
@@ -92,10 +91,10 @@ class Worker:
                 self._requests, replies = self.process.stdin, self.process.stdout
                 reader = threading.Thread(target=_forward, args=(self.process, self._arrived), daemon=True)
                 reader.start()
-            except (OSError, RuntimeError) as error:  # RuntimeError: no thread can be had
+            except (OSError, RuntimeError) as error:  # RuntimeError: no thread can be started
                 raise Ended(f"could not be started ({first_line(error)})", None) from error
             started.pop_all()
-        # Also when the worker is forgotten and when Python exits, so that nothing is left behind.
+        # Also runs when the worker is garbage-collected and when Python exits, so that no process is left.
         files = self._requests, replies, self._words
         self.close = weakref.finalize(self, _end, os.getpid(), self.process, mark, reader, files)
         try:
@@ -114,16 +113,16 @@ class Worker:
         return not _is_over(self.process)
 
     def kill(self) -> None:
-        """End the process and all that it has started, from any thread."""
+        """End the process and all its descendants, from any thread."""
         _kill(self.process, self._mark)
 
     def send(self, request: Any) -> None:
-        with contextlib.suppress(BrokenPipeError):  # the missing reply will tell
+        with contextlib.suppress(BrokenPipeError):  # the missing reply is noticed later
             pickle.dump(request, self._requests)
             self._requests.flush()
 
     def receive(self, time_limit: float | None = None) -> Any:
-        """The next reply. Ended if the process ends before it, or does not give it within `time_limit` seconds."""
+        """The next reply. Ended if the process ends before it replies, or takes longer than `time_limit` seconds."""
         try:
             reply = self._arrived.get(timeout=time_limit)
         except queue.Empty:
@@ -151,7 +150,7 @@ class Worker:
 
 
 def _is_over(process: subprocess.Popen[bytes]) -> bool:
-    """Whether a process has ended. Its number is kept for its group until the group is killed."""
+    """Whether a process has ended. Its process number stays reserved for its group until the group is killed."""
     if process.returncode is not None:
         return True
     if hasattr(os, "waitid"):
@@ -166,7 +165,7 @@ def _is_over(process: subprocess.Popen[bytes]) -> bool:
 
 
 def signal_name(number: int) -> str:
-    """As "SIGKILL"; signals of real time have numbers alone."""
+    """The name of a signal, such as "SIGKILL"; real-time signals have only numbers."""
     return signal.Signals(number).name if number in signal.Signals.__members__.values() else str(number)
 
 
@@ -193,7 +192,7 @@ class _Replies(io.RawIOBase):
     def readinto(self, buffer: Any) -> int:
         if sys.platform != "win32":
             while not self._ready.poll(1000 * GLANCE):
-                # Nobody but the process itself writes here: what it wrote before its end has been read.
+                # Only the process itself writes here, so all that it wrote before its end has been read.
                 if _is_over(self._process) and not self._ready.poll(0):
                     return 0
         data = os.read(self._descriptor, len(buffer))
@@ -213,30 +212,30 @@ def _forward(process: subprocess.Popen[bytes], arrived: queue.SimpleQueue[Any]) 
 def _end(
     owner: int, process: subprocess.Popen[bytes], mark: str, reader: threading.Thread, files: Iterable[IO[bytes]]
 ) -> None:
-    if os.getpid() != owner:  # in a fork, which must leave the process to whoever started it
+    if os.getpid() != owner:  # in a fork, which must leave the process to its parent
         return
     _kill(process, mark)
     process.wait()
     reader.join()
     for file in files:
-        with contextlib.suppress(BrokenPipeError):  # of a request that was still in the buffer
+        with contextlib.suppress(BrokenPipeError):  # a request was still in the buffer
             file.close()
 
 
 def serve(module: str, name: str, megabytes: int | None) -> None:
-    """The process: requests on standard input; on standard output a greeting, then the replies to each request."""
-    # Ctrl-C is for whoever asks, who may want another answer before the end.
+    """The process: reads requests from standard input, and writes a greeting and its replies to standard output."""
+    # Ctrl-C is for the parent, which may want another answer before the end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     guard()
     global _words
     requests, replies, _words = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"), os.dup(2)
     pipe = os.fstat(replies.fileno())
     with open(os.devnull) as nothing:
-        os.dup2(nothing.fileno(), 0)  # whoever asks for input must not read the requests
-    os.dup2(2, 1)  # whatever else gets printed must not mix with the replies
+        os.dup2(nothing.fileno(), 0)  # code that reads standard input must not read the requests
+    os.dup2(2, 1)  # other printed text must not mix with the replies
 
     def say(reply: Any) -> None:
-        if not os.path.samestat(os.fstat(replies.fileno()), pipe):  # closed by others, and the number is another file's
+        if not os.path.samestat(os.fstat(replies.fileno()), pipe):  # other code has closed it and reused its number
             os._exit(1)
         pickle.dump(reply, replies)
         replies.flush()
@@ -251,14 +250,14 @@ def serve(module: str, name: str, megabytes: int | None) -> None:
 
 
 def _limit(megabytes: int | None) -> None:
-    """Leave no core, and take no more memory than so much beyond what there is."""
+    """Forbid core dumps, and limit memory to `megabytes` beyond what the process has now."""
     if sys.platform == "win32":
         return
     import resource
 
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an abort is an answer here, not a reason to fill the disk
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an abort is an expected answer here, and must not fill the disk
     if megabytes is not None and sys.platform == "linux":
-        # Data, not addresses: threads and libraries reserve addresses that they never use.
+        # The limit is on data, not on addresses: threads and libraries reserve addresses that they never use.
         held = re.search(r"^VmData:\s*(\d+) kB", Path("/proc/self/status").read_text(), re.MULTILINE)
         most = (megabytes << 20) + (int(held[1]) << 10 if held else 0)
         hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
@@ -267,12 +266,12 @@ def _limit(megabytes: int | None) -> None:
 
 
 def forget_words() -> None:
-    """In the process: drop what it has written to stderr, which would be mistaken for words about the next request.
+    """Runs in the process: drops what it has written to stderr, which would be mistaken for text on the next request.
 
-    Standard streams that were closed or replaced meanwhile are there again.
+    Standard streams that were closed or replaced meanwhile are restored.
     """
     for name, number in (("stdout", 1), ("stderr", 2)):
-        with contextlib.suppress(Exception):  # whatever somebody has put there
+        with contextlib.suppress(Exception):  # the stream may be any object that user code has put there
             getattr(sys, name).flush()
         os.dup2(_words, number)
         stream = getattr(sys, f"__{name}__")

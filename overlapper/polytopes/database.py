@@ -37,12 +37,12 @@ VERTICES = sql.Table(
     sql.Column("corner", sql.Integer, primary_key=True, autoincrement=False),
     *(sql.Column(axis, sql.Double, nullable=False) for axis in "xyz"),
 )
-# A polytope without corners has no row in `vertices`. The outer join finds it, so that it is not lost in silence.
+# A polytope without corners has no row in `vertices`. The outer join finds it, so that it is not silently ignored.
 ALL = """
     SELECT polytopes.id, x, y, z FROM polytopes LEFT JOIN vertices ON polytope_id = polytopes.id
     ORDER BY polytopes.id, corner
 """
-# The actions that SQLite may do for a query. VACUUM INTO, ATTACH and most pragmas can write, too.
+# The actions that a query may do in SQLite. VACUUM INTO, ATTACH and most pragmas can write, so they are not allowed.
 READING = {sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ, sqlite3.SQLITE_FUNCTION, sqlite3.SQLITE_RECURSIVE}
 # The statement that keeps a session from writing, by the package of the driver.
 POSTGRESQL = "SET SESSION CHARACTERISTICS AS TRANSACTION READ ONLY"
@@ -55,13 +55,13 @@ BATCH = 1_000  # polytopes sent at a time
 def read_polytopes(
     url: str, query: str | None = None, *, on_bad: Callable[[Any, str], object] | None = None
 ) -> Iterator[tuple[Any, Hull]]:
-    """The polytopes of a database one after the other, each with its id; however many there are, few are in memory.
+    """The polytopes of a database one after another, each with its id. Only a few are in memory at a time.
 
     `url` is SQLAlchemy's, such as "sqlite:///parts.db" or "postgresql+psycopg://user@host/parts". `query` returns four
-    columns: the id (of any type) and x, y, z of a point in m. The points of a polytope come one after the other, as by
-    ORDER BY id. Without a query, the tables that `write_polytopes` makes are read. Inner points are welcome. SQLite and
-    PostgreSQL refuse a query that writes. Sessions of MySQL and MariaDB are told to refuse it, which no test has seen
-    them do. Any other database takes back what it wrote.
+    columns: the id (of any type) and x, y, z of a point in m. The points of a polytope must come one after another, as
+    by ORDER BY id. Without a query, the tables that `write_polytopes` makes are read. Points inside a polytope are
+    allowed. SQLite and PostgreSQL refuse a query that writes. Sessions of MySQL and MariaDB are told to refuse it,
+    which is not tested. In other databases, writes are rolled back.
 
     An invalid polytope (a coordinate missing, fewer than four points, all in one plane) raises ValueError with its id.
     If `on_bad` is given, `on_bad(id, reason)` is called instead, and reading goes on. Raises FileNotFoundError if there
@@ -73,7 +73,7 @@ def read_polytopes(
         engine = stack.enter_context(_engine(url))
         sql.event.listen(engine, "connect", _read_only)
         connection = stack.enter_context(engine.connect())
-        # Closed first, as a server keeps a cursor for it.
+        # The result is closed first, because a server keeps a cursor for it.
         rows = stack.enter_context(connection.execution_options(yield_per=ROWS).execute(sql.text(query or ALL)))
         if len(rows.keys()) != 4:
             raise ValueError(f"the query must return id, x, y and z, not {', '.join(rows.keys())}")
@@ -93,11 +93,11 @@ def read_polytopes(
 
 
 def write_polytopes(url: str, polytopes: Iterable[tuple[int, Hull | Overlap | ArrayLike]]) -> int:
-    """Adds polytopes to a database, each with its id; returns how many.
+    """Adds polytopes to a database, each with its id, and returns their number.
 
-    Each is a Hull, an Overlap or (n, 3) points in m; the corners of the convex hull are written. Missing tables are
-    made. Everything is one transaction: if it raises, nothing has been written. Raises ValueError with the id for
-    points that span no polytope, and sqlalchemy.exc.IntegrityError for an id that is taken.
+    Each polytope is a Hull, an Overlap or (n, 3) points in m. The corners of its convex hull are written. Missing
+    tables are made. Everything is one transaction: if it raises, nothing is written. Raises ValueError with the id for
+    points that span no polytope, and sqlalchemy.exc.IntegrityError for an id that exists already.
     """
     count = 0
     remaining = iter(polytopes)
@@ -121,7 +121,7 @@ def _engine(url: str) -> Iterator[sql.Engine]:
 
 
 def _read_only(connection: Any, record: Any) -> None:
-    """Keeps a connection from writing by its own means. SQLAlchemy takes back whatever else was not committed."""
+    """Makes a connection read-only, if its database can. SQLAlchemy rolls back anything else that was not committed."""
     if isinstance(connection, sqlite3.Connection):
         connection.set_authorizer(lambda action, *_: sqlite3.SQLITE_OK if action in READING else sqlite3.SQLITE_DENY)
         return
@@ -130,11 +130,11 @@ def _read_only(connection: Any, record: Any) -> None:
         cursor = connection.cursor()
         cursor.execute(words)
         cursor.close()
-        connection.commit()  # otherwise the statement would hold for this transaction alone
+        connection.commit()  # otherwise the statement would apply only to this transaction
 
 
 def _must_exist(url: sql.URL) -> None:
-    """SQLite would make an empty file where there is none."""
+    """FileNotFoundError for a missing SQLite file, because SQLite would make an empty file."""
     path = url.database
     if url.get_backend_name() != "sqlite" or not path or path.startswith((":memory:", "file:")):
         return

@@ -1,4 +1,4 @@
-"""Closed triangle meshes as convex parts. A convex mesh is its own part; others are cut by CoACD in a process apart.
+"""Closed triangle meshes as convex parts. A convex mesh is its own part. CoACD cuts others, in a separate process.
 
 CoACD (X. Wei, M. Liu, Z. Ling, H. Su, "Approximate convex decomposition for 3D meshes with collision-aware concavity
 and tree search", SIGGRAPH 2022) takes seconds to minutes, ends the process on some meshes and never ends on others.
@@ -34,7 +34,7 @@ Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
 # The error of the corners of a mesh, as a share of the largest coordinate: half a unit of the sixth digit, because text
-# formats have six, and half a unit of single precision, in which meshes are read.
+# formats have six digits, plus half a unit of single precision, because meshes are read in single precision.
 ROUNDING = 5e-6 + 2.0**-24
 
 DIGEST = 32  # bytes of SHA-256
@@ -48,8 +48,8 @@ class NotDecomposed(ValueError):
 class Decomposition:
     """A mesh as the union of convex `parts`, which may overlap each other.
 
-    `mesh_volume` is the volume (m³) that the mesh itself bounds, None if its surface is open or its triangles turn both
-    ways. `path` is where the parts are kept, None if the mesh consists of convex bodies and is modelled exactly.
+    `mesh_volume` is the volume (m³) that the mesh itself bounds; None if its surface is open or its triangles are not
+    consistently oriented. `path` is the file of the parts; None if the mesh consists of convex bodies and is exact.
     """
 
     parts: tuple[Hull, ...]
@@ -66,9 +66,9 @@ class Decomposition:
 class WeldedMesh:
     """The triangles of a mesh, each once, as `faces` (t, 3) over `vertices` (n, 3); equal corners are one vertex.
 
-    `open_edges` counts the edges with an odd number of triangles. `volume` (m³) is the volume that the triangles bound,
-    None if they are open or turn both ways. If it is known, triangles are counter-clockwise from outside, those of a
-    hole from within it, and every edge is run along once in each direction.
+    `open_edges` counts the edges with an odd number of triangles. `volume` (m³) is the volume that the triangles bound;
+    None if the surface is open or not consistently oriented. If the volume is known, triangles are counter-clockwise
+    from outside the solid (from within a hole), and triangles run along every edge once in each direction.
     """
 
     vertices: Vertices
@@ -78,7 +78,7 @@ class WeldedMesh:
 
     @classmethod
     def of(cls, triangles: ArrayLike) -> WeldedMesh:
-        """The mesh of (t, 3, 3) triangles; corners that are equal to the bit are one. NotDecomposed without an area."""
+        """The mesh of (t, 3, 3) triangles. Bit-identical corners become one vertex. NotDecomposed without an area."""
         corners = np.asarray(triangles, dtype=float)
         if corners.ndim != 3 or corners.shape[1:] != (3, 3):
             raise ValueError(f"triangles must have the shape (t, 3, 3), not {corners.shape}")
@@ -102,14 +102,14 @@ class WeldedMesh:
         return self.vertices[self.faces]
 
     def convex_bodies(self) -> list[Hull] | None:
-        """The bodies that the surface consists of as hulls, if all are convex but for rounding and none is a hole."""
+        """The connected bodies of the surface as hulls, if all are convex up to rounding and none is a hole."""
         return None if self.volume is None else _convex_bodies(self.vertices, self.faces)
 
 
 def cache_folder() -> Path:
-    """Where decompositions are kept: overlapper/convex_parts in $XDG_CACHE_HOME, by default in ~/.cache."""
+    """The folder of decompositions: overlapper/convex_parts in $XDG_CACHE_HOME, by default in ~/.cache."""
     home = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    # A relative path is to be ignored, by the XDG base directory specification.
+    # The XDG base directory specification says that a relative path must be ignored.
     return (home if home.is_absolute() else Path.home() / ".cache") / "overlapper" / "convex_parts"
 
 
@@ -122,12 +122,12 @@ def check_threshold(threshold: float) -> None:
 def decompose(
     triangles: ArrayLike, threshold: float = 0.05, enclose: bool = False, time_limit: float = 600.0
 ) -> Decomposition:
-    """The convex parts of the solid that (t, 3, 3) triangles bound; corners that are equal to the bit are one.
+    """The convex parts of the solid that (t, 3, 3) triangles bound. Bit-identical corners become one vertex.
 
     `threshold`, from 0.01 (many parts) to 1 (the convex hull), is the concavity that CoACD leaves, as a part of the
-    mesh's size. A surface with open edges bounds nothing. With `enclose`, CoACD closes it first, as it closes surfaces
-    that cross themselves, by walls that stick out by about 1/180 of the longest side. A line on stderr says when CoACD
-    is started, and where its parts will be kept.
+    mesh's size. A surface with open edges bounds nothing. With `enclose`, CoACD closes such a surface first, and also
+    surfaces that cross themselves. Its walls stick out by about 1/180 of the longest side. A line on stderr says when
+    CoACD is started, and in which file its parts will be kept.
 
     NotDecomposed if the surface is open, or CoACD is not installed, fails, or takes longer than `time_limit` seconds.
     """
@@ -143,7 +143,7 @@ def decompose(
     path, parts = _kept_or_made(vertices, faces, threshold, time_limit)
     hulls: list[Hull] = []
     for part in parts:
-        with contextlib.suppress(ValueError):  # a flat part has no volume
+        with contextlib.suppress(ValueError):  # the part is flat and has no volume
             hulls.append(Hull(part))
     if not hulls:
         raise NotDecomposed("CoACD finds no solid part in the concave mesh")
@@ -151,12 +151,12 @@ def decompose(
 
 
 def _welded(corners: Vertices) -> tuple[Vertices, Faces]:
-    """Vertices and faces, each once; triangles without three corners are dropped."""
+    """Vertices and faces, each once. Triangles without three distinct corners are dropped."""
     vertices, index = np.unique(corners.reshape(-1, 3) + 0.0, axis=0, return_inverse=True)  # + 0.0 makes -0.0 equal 0.0
     faces = index.reshape(-1, 3).astype(np.int64)
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
-    # A mesh drawn from both sides has every triangle twice.
+    # A mesh that is drawn from both sides has every triangle twice.
     first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]
     return vertices, faces[np.sort(first)]
 
@@ -166,13 +166,13 @@ def _edges(faces: Faces) -> Faces:
 
 
 def _open_edges(faces: Faces) -> int:
-    """How many edges have an odd number of triangles: none if the surface parts inside from outside."""
+    """The number of edges with an odd number of triangles. It is 0 if the surface separates inside from outside."""
     _, count = np.unique(np.sort(_edges(faces), axis=1), axis=0, return_counts=True)
     return int((count % 2).sum())
 
 
 def _turns_one_way(faces: Faces) -> bool:
-    """Whether every edge is run along once in each direction: a closed manifold with one orientation."""
+    """Whether triangles run along every edge once in each direction: a closed manifold with one orientation."""
     edges, count = np.unique(_edges(faces), axis=0, return_counts=True)
     backwards = edges[:, ::-1]
     return bool((count == 1).all() and np.array_equal(edges, backwards[np.lexsort(backwards.T[::-1])]))
@@ -184,9 +184,9 @@ def _volume(vertices: Vertices, faces: Faces) -> float:
 
 
 def _convex_bodies(vertices: Vertices, faces: Faces) -> list[Hull] | None:
-    """The connected parts of a closed surface as hulls, if all are convex but for rounding and none is a hole.
+    """The connected parts of a closed surface as hulls, if all are convex up to rounding and none is a hole.
 
-    Faces are connected by common edges: bodies may touch at a corner.
+    Faces are connected by common edges, so bodies that touch at a corner are separate parts.
     """
     hulls: list[Hull] = []
     for shell in _shells(faces):
@@ -195,7 +195,7 @@ def _convex_bodies(vertices: Vertices, faces: Faces) -> list[Hull] | None:
             hull = Hull(corners)
         except ValueError:
             return None
-        # Corners that moved by √3 roundings have moved the surface inwards, or that of the hull outwards, by as much.
+        # Corners that moved by √3 roundings moved the mesh's surface inwards, or the hull's outwards, by this distance.
         layer = 2 * math.sqrt(3) * ROUNDING * float(np.abs(corners).max())
         missing = hull.volume - _volume(vertices, shell)
         if not missing <= layer * _area(hull.corners, hull.triangles) or _deepest(hull, corners) > layer:
@@ -213,7 +213,7 @@ def _shells(faces: Faces) -> list[Faces]:
 
 
 def _a_shell_is_inside_out(vertices: Vertices, faces: Faces) -> bool:
-    """Whether a connected part of a closed surface is clockwise from outside, and in no other part's box as a hole."""
+    """Whether a connected part of a closed surface is clockwise from outside although no other part's box holds it."""
     shells = _shells(faces)
     if len(shells) == 1:
         return False
@@ -224,7 +224,7 @@ def _a_shell_is_inside_out(vertices: Vertices, faces: Faces) -> bool:
 
 
 def _deepest(hull: Hull, points: Vertices) -> float:
-    """m: how far below the surface of a hull the deepest of its points lies."""
+    """The depth (m) of the deepest of some points below the surface of a hull."""
     planes, deepest = hull.halfspaces, 0.0
     for some in np.array_split(points, len(points) * len(planes) // 10**7 + 1):  # 80 MB at a time
         deepest = max(deepest, float(-(some @ planes[:, :3].T + planes[:, 3]).max(axis=1).min()))
@@ -237,7 +237,7 @@ def _area(vertices: Vertices, faces: NDArray[np.integer]) -> float:
 
 
 def _components(groups: Faces, count: int) -> Faces:
-    """For each of `count` numbers, the least number that it is connected to; each row of `groups` connects numbers."""
+    """For each of `count` numbers, the least number that it is connected to. A row of `groups` connects its numbers."""
     labels = np.arange(count)
     while True:
         least = labels.copy()
@@ -250,7 +250,7 @@ def _components(groups: Faces, count: int) -> Faces:
 
 
 def _kept_or_made(vertices: Vertices, faces: Faces, threshold: float, time_limit: float) -> tuple[Path, list[Vertices]]:
-    """CoACD's parts, from the file where they are kept if that is sound, and that file."""
+    """The file where CoACD's parts are kept, and the parts: from the file if it is valid, else newly made."""
     if importlib.util.find_spec("coacd") is None:
         raise NotDecomposed(f"a concave mesh needs {hint('coacd')}")
     version = importlib.metadata.version("coacd")
@@ -271,7 +271,7 @@ def _kept_or_made(vertices: Vertices, faces: Faces, threshold: float, time_limit
 
 
 def _write(path: Path, data: bytes) -> None:
-    """The file appears whole or not at all, whoever else writes it at the same time."""
+    """Write a file atomically, even if another process writes it at the same time."""
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".parts")
     try:
@@ -284,7 +284,7 @@ def _write(path: Path, data: bytes) -> None:
 
 
 def packed(key: str, parts: list[Vertices]) -> bytes:
-    """Parts as bytes: a digest of the key and the rest, then two arrays, all corners and how many each part has."""
+    """Parts as bytes: a digest of the key and the rest, then two arrays: all corners, and the number in each part."""
     buffer = io.BytesIO()
     np.save(buffer, np.concatenate([np.empty((0, 3)), *parts]))
     np.save(buffer, np.array([len(part) for part in parts], dtype=np.int64))
@@ -303,7 +303,7 @@ def unpacked(key: str, data: bytes) -> list[Vertices] | None:
 
 
 def _coacd(vertices: Vertices, faces: Faces, threshold: float, time_limit: float) -> list[Vertices]:
-    """CoACD's parts, from a process of its own. NotDecomposed says how that process ended without them."""
+    """CoACD's parts, made in a separate process. NotDecomposed says how this process ended without a result."""
     try:
         with Worker(_answers) as worker:
             worker.send((vertices, faces, float(threshold), math.ceil(time_limit) + 1))
@@ -318,10 +318,10 @@ def _coacd(vertices: Vertices, faces: Faces, threshold: float, time_limit: float
 
 
 def _answers(request: tuple[Vertices, Faces, float, int]) -> Iterator[list[Vertices]]:
-    """In the process in which CoACD runs: the parts of a mesh."""
+    """Runs in the process of CoACD: yields the parts of a mesh."""
     vertices, faces, threshold, seconds = request
     if sys.platform != "win32":
-        signal.alarm(seconds)  # for when nobody waits any more
+        signal.alarm(seconds)  # in case nobody waits any more
     import coacd
 
     coacd.set_log_level("error")

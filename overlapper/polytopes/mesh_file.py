@@ -1,7 +1,7 @@
-"""Polytopes from and to mesh files, by trimesh: OBJ, STL and PLY are written, and all that trimesh knows are read.
+"""Polytopes from and to mesh files, by trimesh. It writes OBJ, STL and PLY, and reads all formats that trimesh knows.
 
-A file from outside may hang, crash or fill what reads it. Files are parsed in a process of its own, which is kept for
-the next file.
+A file from outside may make its reader hang, crash or run out of memory. Files are therefore parsed in a separate
+process, which is kept for the next file.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ __all__ = ["MeshPart", "NotConvexWarning", "check_ending", "read_hull", "read_pa
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-# The formats that can be written. OBJ has sixteen digits after the point. STL and PLY are in single precision: STL by
-# its nature, PLY by the choice of trimesh.
+# The formats that can be written. OBJ gets sixteen digits after the point. STL and PLY have single precision: STL by
+# definition, PLY because trimesh writes it so.
 MESHES: dict[str, dict[str, Any]] = {".obj": {"digits": 16}, ".stl": {}, ".ply": {}}
 
 # Some formats need other libraries.
@@ -50,15 +50,14 @@ confined = Confined(SECONDS, MEGABYTES)
 
 
 class NotConvexWarning(UserWarning):
-    """A mesh is not the surface of its convex hull, and the hull is more than the mesh encloses."""
+    """A mesh is not the surface of its convex hull, so the hull is larger than the solid that the mesh encloses."""
 
 
 def read_parts(path: str | Path, units: str = "m") -> list[MeshPart]:
-    """The bodies of a mesh file: one of OBJ, OFF, PLY and STL, each instance in the scene of glTF, 3MF and STEP.
+    """The bodies of a mesh file. OBJ, OFF, PLY and STL have one body; glTF, 3MF and STEP have one for each instance.
 
-    `units`, a name that trimesh knows, are those of a file that does not say its own. STEP is read by OpenCASCADE.
-    Raises OSError if there is no such file, ImportError without a library that its format needs, ValueError if it is
-    not a mesh.
+    `units` is a unit that trimesh knows, for files that do not state their own. OpenCASCADE reads STEP. Raises OSError
+    if there is no such file, ImportError without a library that its format needs, ValueError if it is not a mesh.
     """
     missing = [name for name in NEEDS.get(Path(path).suffix.lower(), ()) if importlib.util.find_spec(name) is None]
     if missing:
@@ -67,7 +66,7 @@ def read_parts(path: str | Path, units: str = "m") -> list[MeshPart]:
 
 
 def read_triangles(path: str | Path) -> Array:
-    """All triangles (t, 3, 3) that a mesh file shows, in the file's own frame and unit, which is taken for m.
+    """All triangles (t, 3, 3) of a mesh file, in the file's own frame. Its unit is taken for m.
 
     Raises OSError if there is no such file, ValueError if it is no mesh.
     """
@@ -75,10 +74,10 @@ def read_triangles(path: str | Path) -> Array:
 
 
 def read_hull(path: str | Path) -> Hull:
-    """The convex hull of everything that a mesh file shows, in the file's own frame and unit, which is taken for m.
+    """The convex hull of everything in a mesh file, in the file's own frame. Its unit is taken for m.
 
-    Warns of a mesh with holes or dents (NotConvexWarning), as its hull is not the solid itself. Raises OSError if there
-    is no such file, ValueError if it is no mesh or its points span no polytope.
+    Warns of a mesh with holes or dents (NotConvexWarning), because its hull is not the solid itself. Raises OSError if
+    there is no such file, ValueError if it is no mesh or its points span no polytope.
     """
     hull, closed, share = _parsed(path, "is not a mesh with a hull", mesh_parser.hull)
     if not closed:
@@ -90,7 +89,7 @@ def read_hull(path: str | Path) -> Hull:
 
 
 def _parsed(path: str | Path, wrong: str, parse: Callable[..., T], *arguments: str) -> T:
-    """The result of a function of `mesh_parser` for a file. ValueError says what is `wrong` and why."""
+    """The result of a function of `mesh_parser` for a file. ValueError with the words `wrong` and the reason."""
     _must_be_a_file(Path(path), wrong)
     try:
         return confined(parse, Path(path).absolute(), *arguments)
@@ -98,12 +97,12 @@ def _parsed(path: str | Path, wrong: str, parse: Callable[..., T], *arguments: s
         raise ValueError(f"{path} {wrong}: reading it {unanswered}") from None
     except FileNotFoundError as error:
         raise ValueError(f"{path} {wrong}: {_not_found(path, error)}") from error
-    except Exception as error:  # of many kinds, as every format has a parser of its own
+    except Exception as error:  # of any kind, because every format has its own parser
         raise ValueError(f"{path} {wrong}: {first_line(error)}") from error
 
 
 def _not_found(path: str | Path, error: FileNotFoundError) -> str:
-    """OpenCASCADE writes no file if it finds nothing."""
+    """The reason for a FileNotFoundError: OpenCASCADE writes no file if it finds nothing."""
     return "OpenCASCADE finds no shape in it" if Path(path).suffix.lower() in STEP else first_line(error)
 
 
@@ -126,7 +125,7 @@ def check_ending(path: str | Path) -> None:
 def write_mesh(path: str | Path, polytope: Hull | Overlap | Sequence[Hull | Overlap]) -> None:
     """Writes hulls or overlaps as a triangle mesh in m, each as a closed surface. The name ends in .obj, .stl or .ply.
 
-    OBJ keeps coordinates to 16 decimal places, STL and PLY in single precision, to one part in ten million.
+    OBJ keeps coordinates to 16 decimal places. STL and PLY keep single precision, one part in ten million.
     Raises ValueError for another ending, and for bodies that share nothing.
     """
     check_ending(path)

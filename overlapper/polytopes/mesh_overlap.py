@@ -1,8 +1,8 @@
 """The volume that two closed triangle meshes share, concave or not, as a sum over convex bodies.
 
 A closed mesh is a signed sum of prisms between its triangles and a plane below them. The sign is plus for triangles
-that face up, and minus for those that face down. So the volume that two meshes share is a sum over pairs of prisms,
-each with the product of the two signs. Prisms are convex, so every summand has an error bound of its own.
+that face up, and minus for triangles that face down. So the volume that two meshes share is a sum over pairs of prisms,
+each with the product of the two signs. Prisms are convex, so every summand has its own error bound.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ MOST = 1_000_000  # pairs of prisms, which take half a minute
 def mesh_overlap(a: Array, b: Array, threads: int | None = None) -> tuple[float, float] | None:
     """Volume that closed meshes of triangles (t, 3, 3) and (u, 3, 3) share, and a bound of its error.
 
-    Every edge must be run along once in each direction, counter-clockwise from outside. The volume is in the cube of
-    the unit of the meshes. A region inside several shells of a mesh counts as often. None if there are more than a
-    million pairs of prisms.
+    Triangles must run along every edge once in each direction, counter-clockwise from outside. The volume is in the
+    cube of the unit of the meshes. A region inside several shells of a mesh counts once for each shell. None if there
+    are more than a million pairs of prisms.
     """
     lower, upper = window(a, b)
     if (lower >= upper).any():
@@ -41,7 +41,7 @@ def mesh_overlap(a: Array, b: Array, threads: int | None = None) -> tuple[float,
         return None
     found = batch.overlaps(*where, pairs, threads=threads, separated=False)
     sign = signs[found.pairs[:, 0]] * others[found.pairs[:, 1] - len(first)]
-    # A sum of n numbers is off by less than n roundings of the sum of their sizes.
+    # The rounding error of a sum of n numbers is less than n roundings of the sum of their absolute values.
     rounding = len(sign) * 2.0**-52 * float(found.volume.sum())
     return float((sign * found.volume).sum()), float(found.volume_error.sum()) + rounding + lost + missed
 

@@ -1,6 +1,6 @@
-"""Mesh files parsed by trimesh, in the process of whoever calls: `mesh_file` calls it in a confined one.
+"""Mesh files parsed by trimesh, in the process of the caller. `mesh_file` calls these functions in a confined process.
 
-Only geometry is read. Materials and pictures are passed over: a mesh of some bytes may name a picture of gigabytes.
+Only geometry is read. Materials and pictures are ignored, because a tiny mesh may name a picture of gigabytes.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from overlapper._core import Hull
 
 Array = NDArray[np.float64]
 
-# Limits by the size of a file: a few packed bytes may unpack to very many, and counts are only numbers.
+# Limits by the size of a file: a few packed bytes may unpack to very many, and a file may state any count.
 PACKED = (".bz2", ".gz", ".tgz", ".zip")
 ZIPPED = (".3dxml", ".3mf", ".zae")  # formats that are packed files, mostly of text
-MOST_UNPACKED = 100  # bytes for each of the file; text of numbers has 3 to 20
-MOST_SHOWN = 30_000_000  # corners and indices of a glTF scene, in which a mesh may stand many times: some seconds
+MOST_UNPACKED = 100  # unpacked bytes for each byte of the file; text of numbers has 3 to 20
+MOST_SHOWN = 30_000_000  # corners and indices of a glTF scene, with repeated meshes: they take some seconds
 
-# Materials of an OBJ file that are told apart. trimesh makes a mesh of each, which takes it 2 ms; of a file that has
-# more, all triangles are one mesh.
+# The most materials of an OBJ file that are read. trimesh makes a mesh of each, which takes 2 ms. If a file has more
+# materials, all its triangles form one mesh.
 MOST_MATERIALS = 100
 
-# Assemblies have many bodies in a file, each with a name and a place.
+# Assemblies: formats with many bodies in a file, each with a name and a pose.
 ASSEMBLIES = (".3mf", ".glb", ".gltf", ".step", ".stp")
 
 
@@ -45,8 +45,8 @@ ASSEMBLIES = (".3mf", ".glb", ".gltf", ".step", ".stp")
 class MeshPart:
     """A body of a mesh file, or one instance of it in an assembly.
 
-    `name` is that of its node in the scene, "" if the file is one body. `triangles` (t, 3, 3) are its corners in the
-    frame and unit of the mesh, and `transform` (4, 4) takes these to the world, in m.
+    `name` is the name of its node in the scene, "" if the file is one body. `triangles` (t, 3, 3) are its corners in
+    the frame and unit of the mesh. `transform` (4, 4) maps them to the world, in m.
     """
 
     name: str
@@ -54,16 +54,16 @@ class MeshPart:
     transform: Array
 
     def placed(self, points: Array) -> Array:
-        """Points (n, 3) of the mesh in the world, m."""
+        """Points (n, 3) of the mesh, mapped to the world, in m."""
         return np.asarray(points @ self.transform[:3, :3].T + self.transform[:3, 3])
 
 
 def parts(path: Path, units: str) -> list[MeshPart]:
-    """The bodies of a mesh file; `units` are those of a file that does not say its own. See `mesh_file.read_parts`."""
+    """The bodies of a mesh file. `units` is for files that do not state their unit. See `mesh_file.read_parts`."""
     import trimesh
 
     ending = path.suffix.lower()
-    # The surfaces of several materials are one body's.
+    # Surfaces with several materials belong to one body.
     options: dict[str, Any] = {"merge_primitives": True} if ending in (".glb", ".gltf") else {}
     with _scene(path, **options) as scene:
         to_metres = np.diag([trimesh.units.unit_conversion(scene.units or units, "m")] * 3 + [1.0])
@@ -75,7 +75,7 @@ def parts(path: Path, units: str) -> list[MeshPart]:
         found = [
             MeshPart(name, np.asarray(mesh.triangles, dtype=float), to_metres @ matrix)
             for name, mesh, matrix in meshes
-            if len(getattr(mesh, "faces", ()))  # and not lines or points alone
+            if len(getattr(mesh, "faces", ()))  # not only lines or points
         ]
     if not found:
         raise ValueError("it has no triangles")
@@ -85,7 +85,7 @@ def parts(path: Path, units: str) -> list[MeshPart]:
 
 
 def triangles(path: Path) -> Array:
-    """All triangles (t, 3, 3) that a mesh file shows."""
+    """All triangles (t, 3, 3) of a mesh file."""
     with _scene(path) as scene:
         mesh = scene.to_mesh()
     if not len(mesh.faces):
@@ -94,18 +94,18 @@ def triangles(path: Path) -> Array:
 
 
 def hull(path: Path) -> tuple[Hull, bool, float]:
-    """The hull of all that a mesh file shows, whether the mesh is closed, and the share of the hull that it fills."""
+    """The hull of everything in a mesh file, whether the mesh is closed, and the share of the hull that it fills."""
     with _scene(path) as scene:
         mesh = scene.to_mesh()
         hull = Hull(mesh.vertices[np.unique(mesh.faces)])
-        mesh.merge_vertices(merge_tex=True, merge_norm=True)  # a seam of colours is no hole
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)  # a seam between colours is not a hole
         closed = bool(mesh.is_volume)
         return hull, closed, float(mesh.volume) / hull.volume if closed else 0.0
 
 
 @contextmanager
 def _scene(path: Path, **options: Any) -> Iterator[Any]:
-    """The file as trimesh reads it, and meanwhile no warning about figures that `Hull` refuses."""
+    """The file as trimesh reads it. Warnings about numbers that `Hull` refuses are suppressed meanwhile."""
     import trimesh
 
     _must_fit(path)
@@ -120,7 +120,7 @@ def _scene(path: Path, **options: Any) -> Iterator[Any]:
 
 @cache
 def _resolver() -> type[Any]:
-    """The class that finds what a mesh names: files beside it, and no pipe or device, which might never end."""
+    """The class that opens files named by a mesh: files beside it, but no pipe or device, which might never end."""
     from trimesh.resolvers import FilePathResolver
 
     class Beside(FilePathResolver):
@@ -136,7 +136,7 @@ def _resolver() -> type[Any]:
 
 
 def _of_few_materials(text: bytes) -> bytes:
-    """The text of an OBJ file, without its materials if they are too many."""
+    """The text of an OBJ file, without its materials if there are too many."""
     if text.count(b"usemtl") <= MOST_MATERIALS:
         return text
     return re.sub(rb"^usemtl[^\r\n]*", b"", text, flags=re.MULTILINE)
@@ -156,7 +156,7 @@ def _must_fit(path: Path) -> None:
     if ending == ".stl":
         with path.open("rb") as file:
             head = file.read(1000)
-        if len(head) >= 84 and b"facet" not in head:  # or it is text
+        if len(head) >= 84 and b"facet" not in head:  # otherwise the file is text
             (count,) = struct.unpack_from("<I", head, 80)
             if 84 + 50 * count != size:
                 raise ValueError(f"it counts {count:,} triangles, and has room for {(size - 84) // 50:,}")
@@ -165,7 +165,7 @@ def _must_fit(path: Path) -> None:
 
 
 def _gltf(path: Path) -> Any:
-    """The JSON of a glTF scene, which in .glb is the first chunk. ValueError if a chunk is longer than the file."""
+    """The JSON of a glTF scene; in .glb, it is the first chunk. ValueError if a chunk is longer than the file."""
     data = path.read_bytes()
     if path.suffix.lower() != ".glb":
         return json.loads(data)
@@ -174,7 +174,7 @@ def _gltf(path: Path) -> Any:
 
 
 def _chunks(data: bytes) -> Iterator[tuple[int, int]]:
-    """Where the chunks of a .glb file begin and end, to the end of the file, whatever length it states."""
+    """Begin and end of each chunk of a .glb file, up to the end of the file, whatever length the file states."""
     end = 12
     while end + 8 <= len(data):
         (length,) = struct.unpack_from("<I", data, end)
@@ -185,7 +185,7 @@ def _chunks(data: bytes) -> Iterator[tuple[int, int]]:
 
 
 def _must_be_there(path: Path, scene: Any, size: int) -> None:
-    """ValueError if a list of numbers is longer than all bytes there are, or too much is shown of it."""
+    """ValueError if a list of numbers is longer than all bytes in the file, or the scene shows too many numbers."""
     names = (str(buffer.get("uri", "")) for buffer in scene.get("buffers", ()))
     beside = [path.parent / name for name in names if not name.startswith("data:")]
     size += sum(file.stat().st_size for file in beside if file.is_file())
@@ -200,9 +200,9 @@ def _must_be_there(path: Path, scene: Any, size: int) -> None:
 
 
 def _shown_by_3mf(packed: zipfile.ZipFile) -> int:
-    """How many corners, indices and instances a 3MF scene shows: objects are put together from others, many times over.
+    """The number of corners, indices and instances that a 3MF scene shows. Objects may contain others many times.
 
-    An object of another file of the package counts as many as that file could have.
+    An object in another file of the package counts as the most that this file could hold.
     """
     sizes = {each.filename: each.file_size for each in packed.infolist()}
     own: dict[str, int] = {}

@@ -17,10 +17,10 @@ Source = Literal["cube", "ball", "sphere", "halfspaces"]
 def random_polytope(n: int, source: Source = "cube", *, rng: np.random.Generator | int | None = None) -> Hull:
     """A random polytope about the origin: the hull of a cloud of n random points, or the cell between n random planes.
 
-    `source` says where they are drawn, uniformly. Points are in the "cube" [-1, 1]³, in the unit "ball" or on the unit
-    "sphere"; "halfspaces" touch the unit sphere from outside. Every point on the sphere becomes a corner, every
-    half-space a facet. A cell that is unbounded or reaches beyond 10 is drawn again. Lengths are in m. `rng` is a numpy
-    Generator, a seed, or None for another polytope each time. Raises ValueError for n below 4.
+    `source` is the set from which points or planes are drawn uniformly. Points are in the "cube" [-1, 1]³, in the unit
+    "ball" or on the unit "sphere". Planes of "halfspaces" touch the unit sphere from outside. Every point on the sphere
+    becomes a corner, every half-space a facet. A cell that is unbounded or reaches beyond 10 is drawn again. Lengths
+    are in m. `rng` is a numpy Generator, a seed, or None for another polytope each time. ValueError for n below 4.
     """
     if source not in get_args(Source):
         raise ValueError(f"source must be one of {', '.join(get_args(Source))}, not {source!r}")
@@ -38,7 +38,7 @@ def random_polytope(n: int, source: Source = "cube", *, rng: np.random.Generator
 
 
 def _directions(n: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """(n, 3) unit vectors, uniform on the sphere, as the normal distribution has no preferred direction."""
+    """(n, 3) unit vectors, uniform on the sphere, because the normal distribution has no preferred direction."""
     vectors = rng.normal(size=(n, 3))
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 

@@ -14,13 +14,14 @@ from overlapper.printable import first_line
 from overlapper.shapes import Shape
 from overlapper.shapes.table import KINDS, facts
 
-LARGEST = 24 * 1_000_000  # bytes of the vertices of a hull: a million, of which Hull itself needs seconds
+LARGEST = 24 * 1_000_000  # bytes of the vertices of a hull: a million vertices, for which Hull needs seconds
 
 
 def text_of(shape: Shape) -> str:
-    """The shape as JSON: its kind and what it is built from, in SI units.
+    """The shape as JSON: its kind and its defining numbers, in SI units.
 
-    The vertices of a hull are sorted, as little-endian doubles, deflated and in base 64: 20 characters each, mostly.
+    The vertices of a hull are sorted, written as little-endian doubles, deflated and encoded in base 64. A vertex
+    usually takes 20 characters.
     """
     return json.dumps([type(shape).__name__, *map(_text_of_parameter, facts(shape).parameters())])
 
@@ -32,7 +33,7 @@ def _text_of_parameter(value: float | NDArray[np.float64]) -> object:
 
 
 def shape_of(text: str) -> Shape:
-    """The shape of such a text. ValueError if the text is invalid."""
+    """The shape of a text from `text_of`. ValueError if the text is invalid."""
     try:
         name, *parameters = json.loads(text)
         kind = {each.__name__: each for each in KINDS}[name]
@@ -49,7 +50,7 @@ def _parameter_of_text(value: object) -> object:
 
 
 def _inflated(data: bytes) -> bytes:
-    """The inflated data. ValueError beyond LARGEST, as a few deflated bytes may inflate to very many."""
+    """The inflated data. ValueError beyond LARGEST, because a few deflated bytes may inflate to very many."""
     unpacker = zlib.decompressobj()
     inflated = unpacker.decompress(data, LARGEST)
     if not unpacker.eof:
@@ -58,7 +59,7 @@ def _inflated(data: bytes) -> bytes:
 
 
 def alike(a: Shape, b: Shape) -> bool:
-    """True if the shapes are the same to within 1e-9 of their size: as far as another compiler may move them."""
+    """True if the shapes are equal to within 1e-9 of their size. Another compiler may change shapes by so much."""
     if type(a) is not type(b):
         return False
     ours, theirs = _figures(a), _figures(b)
@@ -66,7 +67,7 @@ def alike(a: Shape, b: Shape) -> bool:
 
 
 def _figures(shape: Shape) -> NDArray[np.float64]:
-    """Numbers that tell a shape from others of its kind, all of them lengths; for a half-space, normal and offset."""
+    """Numbers that distinguish a shape from others of its kind: lengths, or normal and offset of a half-space."""
     parameters = facts(shape).parameters()
     if any(np.ndim(value) == 2 for value in parameters):
         return np.hstack([np.cbrt(shape.volume), shape.centroid, shape.bounds.ravel()])

@@ -1,11 +1,11 @@
 """The volume between quadrics and planes, by slices bounded by arcs of conics, in ball arithmetic.
 
 While the outline of the slices y₀ = t keeps its order, the area is an analytic function of t. Near an event at s, it is
-analytic in x with t = s ± x². Gauss and Legendre's rule has an error that follows from a bound of the function in a
-complex disc (Trefethen, Approximation Theory and Approximation Practice, theorem 19.3).
+analytic in x with t = s ± x². The error of the Gauss–Legendre rule follows from a bound of the function in a complex
+disc (Trefethen, Approximation Theory and Approximation Practice, theorem 19.3).
 
-Slices whose outline is not proved are bounded by the theorem of Brunn and Minkowski: the root of the area is concave.
-They are those next to an event, and those at which four surfaces meet, or nearly.
+Slices whose outline is not proved are bounded by the Brunn–Minkowski theorem: the square root of the area is concave.
+These are slices next to an event, and slices in which four surfaces meet or nearly meet.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from overlapper.proof.outline import Outline, Outlines
 from overlapper.proof.round_frame import Constraint, Floats, RoundFrame, framed
 from overlapper.proof.vectors import rational
 
-# The half of an interval, as a share of the disc in which its area is proved to be analytic.
+# Half the length of an interval, as a share of the radius of the disc in which its area is proved to be analytic.
 SHARE = 0.62
 # The share of the bits of a number to which a volume is computed.
 ACCURACY = 0.42
@@ -33,13 +33,13 @@ POINTS, INTERVALS = 96, 600
 
 @lru_cache(maxsize=256)
 def rule(points: int, bits: int) -> list[tuple[arb, arb]]:
-    """Places in (-1, 1) and weights of Gauss and Legendre."""
+    """Nodes in (-1, 1) and weights of the Gauss–Legendre rule."""
     with ctx.workprec(bits):
         return [arb.legendre_p_root(points, k, weight=True) for k in range(points)]
 
 
 class Run:
-    """Slices next to each other whose outline is proved: the volume, and both ends as seen from inside."""
+    """Adjacent slices whose outline is proved: their volume, and both ends as seen from inside."""
 
     def __init__(self, parts: list[Part]) -> None:
         self.volume = sum((part.volume for part in parts), arb(0))
@@ -50,7 +50,7 @@ class Run:
 
 
 class Part:
-    """The slices between x = low and x = high of an outline that is proved for them."""
+    """The slices between x = low and x = high, and the outline that is proved for them."""
 
     def __init__(self, following: Following, low: float, high: arb, disc: float, tolerance: float) -> None:
         self.following, self.low, self.high = following, arb(low), high
@@ -75,7 +75,7 @@ class Part:
         self.low_t, self.high_t = ends if following.path.side > 0 else ends[::-1]
 
     def end(self, upper: bool) -> tuple[arb, arb, arb]:
-        """At the end of greater or less t: t, the root of the area, and its growth outwards by secants."""
+        """At the upper or lower end: t, the square root of the area, and its growth outwards by secants."""
         at_high = upper == (self.following.path.side > 0)
         share = arb(1) / 64
         x, y = (
@@ -89,11 +89,11 @@ class Part:
 
 
 class ByArcs:
-    """The volume that constraints leave of a box, by slices in a frame in which it is round.
+    """The volume that constraints leave of a box, by slices in a frame in which this part is round.
 
-    All of them leave nothing near the sides of the box. Those that remove nothing from the box may be left out: if a
-    point inside of the rest is in the box, the rest is, as a way out of the box would be at its side. Else they leave
-    nothing.
+    All constraints together leave nothing near the sides of the box. Constraints that remove nothing from the box may
+    be left out. If a point inside the remaining constraints is in the box, their whole set is in the box: a path out of
+    the box would cross its sides. Otherwise the constraints leave nothing of the box.
     """
 
     def __init__(self, constraints: list[Constraint], around: Floats) -> None:
@@ -126,7 +126,7 @@ class ByArcs:
                 ctx.cap = cap
 
     def _at_most(self) -> arb:
-        """More than the volume of a box around."""
+        """More than the volume of the box `around`."""
         x, y, z = (arb(size) for size in self.around[1] - self.around[0])
         return arb(0).union(2 * x * y * z)
 
@@ -175,7 +175,7 @@ class Slicing:
         return Run(parts) if parts else None
 
     def _half(self, path: Path, middle: float) -> list[Part]:
-        """From the middle of a gap towards the event at the anchor."""
+        """The parts from the middle of a gap towards the event at the anchor."""
         high = (path.side * (arb(middle) - path.anchor)).sqrt()
         lowest = math.sqrt(self.near * (float(self.outlines.high[0]) - float(self.outlines.low[0])))
         parts: list[Part] = []
@@ -224,17 +224,20 @@ class Slicing:
 
 
 def beyond(t: arb, f: arb, growth: arb) -> arb:
-    """The volume beyond the last slice, where the root of the area falls at least as fast as before."""
+    """The volume beyond the last slice, where the square root of the area falls at least as fast as before."""
     if not growth < 0:
         raise Refused
     return arb(0).union(-(f**3) / (3 * growth))
 
 
 def between(t: arb, f: arb, rate: arb, u: arb, g: arb, growth: arb) -> arb:
-    """The volume between slices t < u with roots of areas f and g, which grow by `rate` at t, and backwards at u."""
+    """The volume between slices t < u. The square roots of their areas are f and g.
+
+    The square root grows by at most `rate` at t, and by at most `growth` backwards at u.
+    """
     length = u - t
     least = length * (f * f + f * g + g * g) / 3
-    # The lines from both ends meet at this share of the way.
+    # The lines from both ends meet at this share of the length.
     share = float(((g + growth * length - f) / (length * (rate + growth))).mid())
     share = min(max(share, 0.0), 1.0) if share == share else 0.5
     greatest = arb(0)

@@ -1,11 +1,12 @@
-"""Slices between quadrics and planes, whose outline of arcs and chords is followed and proved, in ball arithmetic.
+"""Slices between quadrics and planes. Their outlines of arcs and chords are followed and proved, in ball arithmetic.
 
-That a guessed outline is the true one is proved without a look at all other curves. Each arc lies on the curve of one
-constraint and below all others, as do the corners of a polygon of tangents around it. So all arcs lie on the boundary
-of the slice, which is convex. A closed chain of such arcs that goes round once is that boundary.
+The proof of a guessed outline does not need the crossings of all other curves. Each arc lies on the curve of one
+constraint and below all others, because the corners of a polygon of tangents around the arc lie below all others. So
+all arcs lie on the boundary of the slice, which is convex. A closed chain of such arcs that goes round once is the
+boundary.
 
-Corners are proved by Kantorovich's theorem, for a Taylor polynomial in the place of a point: F(P + e) = 0 has a
-solution with |e| <= 2 α if 4 α β γ < 1. Here α bounds |J⁻¹ F(P)|, β bounds |J⁻¹|, and γ the quadratic terms.
+Corners are proved by Kantorovich's theorem, with a Taylor polynomial P in place of a point: F(P + e) = 0 has a solution
+with |e| <= 2 α if 4 α β γ < 1. Here α bounds |J⁻¹ F(P)|, β bounds |J⁻¹|, and γ bounds the quadratic terms.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from flint import arb, arb_poly, arb_series, ctx
 from overlapper.proof.outline import Outline
 from overlapper.proof.round_frame import Constraint, Floats
 
-# Coefficients of a Taylor polynomial of a corner.
+# The number of coefficients of a Taylor polynomial of a corner.
 ORDER = 10
-# Bounds in doubles are raised by this factor, which is more than all their rounding.
+# Bounds in doubles are multiplied by this factor, which exceeds all their rounding.
 UP = 1.0 + 2.0**-40
-# Parts into which an interval is cut to prove its outline, and into which an arc is cut.
+# The most parts into which an interval is cut to prove its outline, and into which an arc is cut.
 PARTS, FINEST = 16, 1 << 18
 
 
@@ -65,7 +66,7 @@ class Curve:
         return p * (self.a * p + 2 * self.b * q) + self.c * q * q
 
     def arm(self, half: tuple[Any, Any]) -> tuple[Any, Any]:
-        """From the centre of the conic to a point, by the half gradient there."""
+        """The vector from the centre of the conic to a point, from half the gradient at the point."""
         u, v = half
         return (self.c * u - self.b * v) / self.det, (self.a * v - self.b * u) / self.det
 
@@ -100,7 +101,7 @@ class Path:
 
 
 class Corner:
-    """A corner along a path, as a polynomial in x - middle, and what Kantorovich's theorem says in a disc."""
+    """A corner along a path, as a polynomial in x - middle, with an error bound in a disc by Kantorovich's theorem."""
 
     def __init__(self, one: Curve, other: Curve, path: Path, middle: float, start: Floats) -> None:
         p, q = self._series(one, other, path, middle, start)
@@ -120,7 +121,7 @@ class Corner:
 
     @staticmethod
     def _series(one: Curve, other: Curve, path: Path, middle: float, start: Floats) -> tuple[Any, Any]:
-        """By Newton's method for power series, whose length doubles in every step."""
+        """The power series of a corner, by Newton's method. The number of correct terms doubles in every step."""
         ctx.cap = 1
         p, q = arb_series([float(start[0])]), arb_series([float(start[1])])
         for cap in (1, 1, 1, 2, 4, 8, ORDER, ORDER):
@@ -148,7 +149,7 @@ class Corner:
             return math.inf
         alpha = max(most(residual, disc) for residual in self.residual) / least * UP
         beta = max(sum(most(x, disc) for x in row) for row in self.adjugate) / least * UP
-        # Half gradients are half of the derivatives: the inverse of J is twice the adjugate over twice the determinant.
+        # Half gradients are half the derivatives: the inverse of J is twice the adjugate over twice the determinant.
         if not 4 * alpha * beta * self.bend < 0.9:
             return math.inf
         self.unique = 0.49 / (beta * self.bend) if beta * self.bend > 0 else math.inf
@@ -183,7 +184,7 @@ class Model:
         return self._most
 
     def least(self) -> float:
-        """A lower bound of the absolute value; not positive if it may be zero."""
+        """A lower bound of the absolute value; not positive if the value may be zero."""
         first, rest = ceilings_and_first(self.poly)
         return first - (most(rest, self.disc) * self.disc + self.error) * UP
 
@@ -223,7 +224,7 @@ class Arc:
     def __init__(self, curve: Curve, level: tuple[Model, Model, Model], start: Pair, end: Pair) -> None:
         self.curve = curve
         u, v = _arm(curve, (level[0], level[1]))
-        self.square = u * level[0] + v * level[1] - level[2]  # of the radius, in the frame of the circle
+        self.square = u * level[0] + v * level[1] - level[2]  # the squared radius, in the frame of the circle
         self.arms = (start[0] + u, start[1] + v), (end[0] + u, end[1] + v)
         way = end[0] - start[0], end[1] - start[1]
         self.way = way
@@ -276,7 +277,7 @@ def _square(curve: Curve, u: Pair, v: Pair) -> Model:
 
 
 class Following:
-    """An outline that is followed along a path around x = middle."""
+    """An outline that is followed along a path, in a neighbourhood of x = middle."""
 
     def __init__(self, curves: list[Curve], outline: Outline, path: Path, middle: float) -> None:
         self.curves, self.outline, self.path, self.middle = curves, outline, path, middle
@@ -288,7 +289,7 @@ class Following:
         ]
 
     def disc(self, wanted: float) -> float:
-        """The radius, not above the wanted one, of a disc in which the corners are proved to be analytic."""
+        """The radius, at most `wanted`, of a disc in which the corners are proved to be analytic."""
         disc = wanted
         while any(corner.error(disc) == math.inf for corner in self.corners):
             disc *= 0.85
@@ -297,7 +298,7 @@ class Following:
         return disc
 
     def model(self, disc: float) -> None:
-        """Models of all that decides about the outline in a disc."""
+        """Make models of all functions that determine the outline in a disc."""
         t = self.path.series(self.middle, arb_poly)
 
         def exact(x: Any) -> Model:
@@ -334,7 +335,7 @@ class Following:
     # In thin numbers.
 
     def area(self, x: arb) -> arb:
-        """The area of the slice at x, next to rounding."""
+        """The area of the slice at x, up to rounding."""
         t = self.path.t(x)
         used = {k: self.curves[k].at(t) for k in self.chain}
         if not self.pairs:
@@ -384,7 +385,7 @@ class Following:
     # The proof of the outline.
 
     def prove(self, low: float, high: float) -> None:
-        """That the outline is that of all slices between x = low and x = high, in as many parts as it takes."""
+        """Prove that all slices between x = low and x = high have this outline, in as many parts as needed."""
         self._turns_once()
         work = [(low, high, 1)]
         while work:
@@ -396,7 +397,7 @@ class Following:
                 work += [(start, middle, 2 * parts), (middle, end, 2 * parts)]
 
     def _turns_once(self) -> None:
-        """The corners go round a point once; in the middle, which is enough as they never meet."""
+        """Prove that the corners go round a point once. The middle slice is enough, because corners never meet."""
         if len(self.points) < 3:
             return
         points = [(p.poly[0] + arb(0, p.error), q.poly[0] + arb(0, q.error)) for p, q in self.points]
@@ -433,11 +434,11 @@ class Following:
     def _half_is_below(self, k: int, side: int, turn: arb, away: arb) -> bool:
         """Whether the half of an arc next to a corner is below all other constraints.
 
-        The points of a polygon of tangents around it are at `inwards * arm + sideways * tangent` from the corner.
+        A polygon of tangents around it has its points at `inwards * arm + sideways * tangent` from the corner.
         """
         if (k, side) not in self._sides:
             self._sides[k, side] = list(self._seen_along(k, side))
-        # The polygon of fixed angles goes past the middle of the arc, but not past its end.
+        # The polygon with fixed angles goes past the middle of the arc, but not past its end.
         enough = turn.upper()
         if not enough < 2 * turn.lower():
             return False
@@ -455,7 +456,7 @@ class Following:
         )
 
     def _seen_along(self, k: int, side: int) -> Iterator[list[Model | None]]:
-        """Each other constraint as a quadratic in (inwards, sideways); a constant that is zero is None."""
+        """Each other constraint as a quadratic in (inwards, sideways). A constant term that is zero is None."""
         number, arc = self.chain[k], self.arcs[k]
         assert arc is not None
         arm, seen = (arc.arms[0], self.seen[k - 1]) if side > 0 else (arc.arms[1], self.seen[k])
@@ -472,10 +473,10 @@ class Following:
             yield form
 
     def _is_whole(self, away: arb) -> bool:
-        """Whether a whole ellipse is below all others.
+        """Whether a whole ellipse is below all other constraints.
 
-        Points of a polygon around it are c + ρ w, with constants w. Another constraint there is L + 2 ρ N <= 0, whose
-        sign is that of a polynomial, as L, N and ρ² are polynomials.
+        Points of a polygon around it are c + ρ w, with constants w. Another constraint at these points is
+        L + 2 ρ N <= 0. Its sign is the sign of a polynomial, because L, N and ρ² are polynomials.
         """
         number = self.chain[0]
         curve, (d, e, f) = self.curves[number], self.levels[number]
@@ -525,7 +526,7 @@ Step = tuple[arb, arb]
 
 
 def is_arc_below(holds: Callable[[Step], bool], touching: Callable[[int, int], tuple[Step, Step]], cuts: int) -> bool:
-    """Whether a convex constraint holds on a polygon of tangents around an arc, which is cut where it must be."""
+    """Whether a convex constraint holds on a polygon of tangents around an arc. The arc is cut where necessary."""
     work = [(m, cuts) for m in range(cuts)]
     while work:
         m, count = work.pop()
@@ -538,7 +539,10 @@ def is_arc_below(holds: Callable[[Step], bool], touching: Callable[[int, int], t
 
 
 def tangents(turn: arb, m: int, count: int) -> tuple[Step, Step]:
-    """Of part m of an arc: where the tangents at its ends meet, and its end, as (cos - 1, sin) without cancellation."""
+    """For part m of an arc: the point where the tangents at its ends meet, and its end.
+
+    Both are (cos - 1, sin), computed without cancellation.
+    """
     part = turn / (2 * count)
     scale = part.cos()
     middle, end = part * (2 * m + 1), part * (2 * m + 2)
@@ -548,7 +552,7 @@ def tangents(turn: arb, m: int, count: int) -> tuple[Step, Step]:
 
 
 def is_below(form: list[Model | None], step: Step, away: arb) -> bool:
-    """Whether a quadratic in `step` is not positive for all of `away`."""
+    """Whether a quadratic in `step` is not positive for all values of `away`."""
     u, v = step
     parts = list(zip(form, (arb(1), u, v, u * u, u * v, v * v)))
     poly, error = arb_poly([0]), arb(0)
@@ -564,14 +568,14 @@ def angle_of(sine: float, cosine: float) -> float:
 
 
 def turned(sine: arb, cosine: arb) -> arb:
-    """The angle in (0, 2π) of a point next to the unit circle."""
+    """The angle in (0, 2π) of a point near the unit circle."""
     angle = arb(angle_of(float(sine.mid()), float(cosine.mid())))
     s, c = angle.sin(), angle.cos()
     return angle + arb.atan2(sine * c - cosine * s, cosine * c + sine * s)
 
 
 def segment(curve: Curve, half: tuple[arb, arb], way: tuple[arb, arb]) -> arb:
-    """Between an arc and its chord: `half` is the half gradient at the start of the arc, and `way` leads to its end."""
+    """The area between an arc and its chord: `half` is half the gradient at the arc's start, `way` leads to its end."""
     x = curve.arm(half)
     square = x[0] * half[0] + x[1] * half[1]
     sine = curve.root * (x[0] * way[1] - x[1] * way[0]) / square
@@ -581,7 +585,7 @@ def segment(curve: Curve, half: tuple[arb, arb], way: tuple[arb, arb]) -> arb:
 
 
 def exactly(one: Curve, other: Curve, at_one: Any, at_other: Any, p: arb, q: arb) -> tuple[arb, arb]:
-    """The corner next to a point, by Newton's method and Kantorovich's theorem."""
+    """The corner near a point, by Newton's method and Kantorovich's theorem."""
     goal = 2.0 ** (-0.6 * ctx.prec)
     for _ in range(12):
         (a, b), (c, d) = one.half_gradient(at_one, p, q), other.half_gradient(at_other, p, q)

@@ -1,7 +1,7 @@
-"""The volume that a ball, a cylinder and a polytope share: a slice is a disc between two lines, cut by others.
+"""The volume that a ball, a cylinder and a polytope share. A slice is a disc between two lines, cut by other lines.
 
-A line that cuts the disc takes a segment away. The integral of a segment is elementary for a line of the polytope, and
-not for a line of the cylinder.
+A line that cuts the disc removes a segment. The integral of a segment is elementary for a line of the polytope, but not
+for a line of the cylinder.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class BallAndTube(Slices):
         return u[0] * v[0] / self.tt + u[1] * v[1] / self.pp
 
     def is_outside(self, point: Point, flat: bool = False) -> bool:
-        """Whether the point is certainly outside. A flat point stands for all points that differ from it in q."""
+        """Whether the point is certainly outside. A flat point represents all points that differ from it only in q."""
         t, p, q = point
         off = p - self.level
         if t * t / self.tt + off * off / self.pp > self.thin:
@@ -151,7 +151,7 @@ class BallAndTube(Slices):
         if not around:
             return None
         found = SliceArea()
-        kept: list[tuple[int, int | None, int | None]] = []  # a line, and the lines that it meets in the disc
+        kept: list[tuple[int, int | None, int | None]] = []  # a line, and the lines that meet it in the disc
         for k, (line, end) in enumerate(around):
             before, start = around[k - 1]
             after = around[(k + 1) % len(around)][0]
@@ -166,7 +166,7 @@ class BallAndTube(Slices):
             by_disc = is_positive(-reach - here), is_positive(there - reach)
             kept.append((line, None if by_disc[0] else before, None if by_disc[1] else after))
         if not kept:
-            # No bits tell the side of a line through the centre. It is in the disc unless other lines cut it off.
+            # More bits do not decide the side of a line through the centre. It is in the disc unless others cut it off.
             if any(offsets[line] < 0 for line, _ in around):
                 return None
             assert all(is_positive(offsets[line]) for line, _ in around)
@@ -196,7 +196,7 @@ class BallAndTube(Slices):
         return arb.atan2(y * root(self.qq), x * root(self.pp))
 
     def _turn(self, line: int, following: int, offsets: list[arb], disc: arb) -> arb:
-        """The angle from the normal of a line to that of the next beyond an arc, with all turns of the arc."""
+        """The angle from the normal of a line to the next line's normal after an arc, with all turns of the arc."""
         turn = self._direction(following) - self._direction(line) if following != line else arb(0)
         arc = turn
         for k in (line, following):
@@ -210,7 +210,7 @@ class BallAndTube(Slices):
     # Integrals
 
     def form(self, line: int, other: int) -> Form:
-        """Twice the area between the origin, the foot on a line and where it meets another."""
+        """Twice the area of the triangle of the origin, the foot on a line, and the line's point on another line."""
         key = (line, other)
         if key not in self._forms:
             p, q = self.corner(line, other)
@@ -250,7 +250,7 @@ class BallAndTube(Slices):
         through_pole = offset[0] * offset[0] == offset[1] * offset[1] * self.tt * self.thick
         for side, pole in ((-1, radius), (1, -radius)):
             if through_pole and side * offset[0] * offset[1] >= 0:
-                continue  # the slack and the share of the pole are zero, which balls may not see
+                continue  # the slack and the share of the pole are zero, but balls may not show it
             slack = d0 + d1 * pole
             slope = -2 * pole - 2 * slack * d1
             turns = [
@@ -261,12 +261,12 @@ class BallAndTube(Slices):
         return total
 
     def _strip_segment(self, line: int, low: arb, high: arb, goal: int) -> arb:
-        """The same with d = ±level + ρ₁, in the angle in which the thinner of both is a cosine."""
+        """The same integral with d = ±level + ρ₁, in the angle in which the thinner of both is a cosine."""
         side = 1 if line == 0 else -1
         away = arb(side * self.level) / root(self.pp)
         thin, thick = arb(self.thin), arb(self.thick)
         radius = root(self.thin)
-        # At t = 0. Elsewhere the loss is written without a difference, because a ball would not show its sign.
+        # The value at t = 0. Elsewhere, the loss is written without a difference: a ball would not show its sign.
         rest = thick - thin - away * away - 2 * away * radius
         tube_is_thin = self.thin <= self.thick
         least = root(min(self.thin, self.thick))

@@ -1,8 +1,8 @@
-"""The certificate of an overlap: found in doubles, completed in rational arithmetic, so that its check is exact.
+"""The certificate of an overlap. It is found in doubles and completed in rational arithmetic, so its check is exact.
 
-The core's answer supplies only combinatorics (which facets there are, whose they are, where they meet) and directions
-of planes. Offsets, corners and inner points are computed anew from the shapes. Coordinates are counted from a reference
-near the common part, which keeps the fractions short.
+The core's answer supplies only combinatorics (the facets, their owners, how they meet) and directions of planes.
+Offsets, corners and inner points are computed anew from the shapes. Coordinates are relative to a reference point near
+the common part, which keeps the fractions short.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from overlapper.rational import Exact, cross, exact, fans, integers, primitive, 
 Floats = NDArray[np.float64]
 
 # Bits of a coordinate below the thickness of the common part, and of a share below 1. The second number is for facets
-# that differ only by rounding: the first cannot tell their corners apart.
+# that differ only by rounding, because the first does not distinguish their corners.
 BITS = (64, 256)
 
-# Bits to which a volume with a round body is proved, and bits of the bounds.
+# Bits to which a volume with a round body is proved, and bits of the rounded bounds.
 NARROW, DIGITS = 49, 52
 
 
 def certificate(overlap: Overlap) -> Certificate:
-    """A proof of the status of `overlap`, and of bounds of its volume, for a reader who does not trust the core.
+    """A proof of the status of `overlap` and of bounds of its volume, which does not rely on the core.
 
     `verify()` of the result checks it in rational arithmetic, without the core, and returns (lower, upper) bounds of
     the common volume in m³ as fractions. CertificateError says why there is no certificate.
@@ -73,7 +73,7 @@ def _separated(overlap: Overlap, bodies: list[RationalBody]) -> Separated:
 
 
 def _facing(overlap: Overlap, bodies: list[RationalBody]) -> list[OwnedPlane]:
-    """The supporting planes of a pair across its normal, or across that of a half-space."""
+    """The supporting planes of a pair perpendicular to its normal, or to the normal of a half-space."""
     if overlap.normal is None:
         return []
     normal = exact(overlap.normal)
@@ -99,7 +99,7 @@ def _touching(overlap: Overlap, bodies: list[RationalBody]) -> Touching:
 
 
 def _nearest(body: RationalBody, shape: Shape, point: Exact) -> Exact:
-    """A point of the body near a point just outside, on the way from there to the middle of the body."""
+    """A point of the body near a point just outside, on the line from this point to the middle of the body."""
     if body.contains(point[None])[0]:
         return point
     if not body.facts.bounded:
@@ -120,7 +120,7 @@ def _nearest(body: RationalBody, shape: Shape, point: Exact) -> Exact:
 
 
 def _bracketed(overlap: Overlap) -> Bracketed | None:
-    """Bounds that stay narrow when they are rounded to a few digits; None if no volume is proved to be shared."""
+    """Bounds that stay narrow when they are rounded to a few digits; None if no common volume is proved."""
     found: list[Bounds] = []
 
     def is_narrow(bounds: Bounds) -> bool:
@@ -140,7 +140,7 @@ def _bracketed(overlap: Overlap) -> Bracketed | None:
 
 
 def between_planes(overlap: Overlap) -> Overlapping:
-    """A proof of bounds of the volume by planes alone: exact for polyhedra, and wide for round bodies."""
+    """A proof of bounds of the volume by planes only: exact for polyhedra, but wide for round bodies."""
     bodies = [RationalBody(shape) for shape in overlap.shapes]
     for number, body in enumerate(bodies):
         if not body.facts.has_exits:
@@ -185,15 +185,15 @@ class Star(NamedTuple):
 def _published_polytope(overlap: Overlap, bodies: list[RationalBody], planes: list[OwnedPlane]) -> Star:
     """The facets of the overlap, with corners where their exact planes meet. Round bodies have too many to clip.
 
-    The point inside is the centroid. Most corners lie where bodies are round, so their mean would be pulled more. The
-    core's inner polytope has another point inside. The middles of the edges make up for the difference.
+    The point inside is the centroid. Most corners lie on round parts, so from their mean the vertices would need more
+    pull. The core's inner polytope has another point inside. The middles of the edges compensate for this difference.
     """
     rings, corners = _with_middles(overlap.facets, _corners(overlap, planes))
     return _about_middles(planes, rings, corners)._replace(middle=exact(overlap.centroid))
 
 
 def _with_middles(rings: Sequence[NDArray[np.int32]], corners: Exact) -> tuple[list[NDArray[np.int32]], Exact]:
-    """The polygons and their corners, with a corner in the middle of every edge."""
+    """The polygons and their corners, with an added corner in the middle of every edge."""
     edges = [np.sort([ring, np.roll(ring, -1)], axis=0).T for ring in rings]
     ends, place = np.unique(np.vstack(edges), axis=0, return_inverse=True)
     middles = np.split(len(corners) + place.ravel(), np.cumsum([len(ring) for ring in rings])[:-1])
@@ -209,7 +209,7 @@ def _on_fine_grid(points: Exact) -> tuple[Exact, int, Exact]:
 
 
 def _about_middles(planes: list[OwnedPlane], rings: list[NDArray[np.int32]], corners: Exact) -> Star:
-    """Triangles about the middle of every facet. On round bodies the middle needs less pull than the corners."""
+    """Triangles around the middle of every facet. On round bodies, the middle needs less pull than the corners."""
     numbers, scale, first = _on_fine_grid(corners)
     middles = np.array([numbers[ring].sum(axis=0) // len(ring) for ring in rings])
     fan = [(len(corners) + k, ring[i - 1], ring[i]) for k, ring in enumerate(rings) for i in range(len(ring))]
@@ -220,7 +220,7 @@ def _about_middles(planes: list[OwnedPlane], rings: list[NDArray[np.int32]], cor
 
 
 def _common_polytope(overlap: Overlap, bodies: list[RationalBody], planes: list[OwnedPlane]) -> Star:
-    """The polytope below the planes of the overlap's facets and of all flat sides of the bodies, without rounding."""
+    """The exact polytope below the planes of the overlap's facets and of all flat sides of the bodies."""
     box = exact(overlap.bounds)
     reference = box.sum(axis=0) / 2
     room = max(box[1] - box[0]) + max(abs(reference)) / 2**40
@@ -265,7 +265,7 @@ def _rounded(points: Exact, exponent: int) -> Exact:
 
 
 def _corners(overlap: Overlap, planes: Sequence[OwnedPlane]) -> Exact:
-    """For each vertex, where the planes around it meet, to rounding; the vertex itself if they do not meet."""
+    """For each vertex, the point where the planes around it meet, up to rounding; the vertex itself if none."""
     around = defaultdict(list)
     for facet, ring in enumerate(overlap.facets):
         for vertex in ring:
@@ -298,7 +298,7 @@ def _spread(units: Floats, facets: list[int]) -> tuple[int, int, int]:
 
 
 def _margin(bodies: Sequence[RationalBody], point: Exact, thickness: float) -> Fraction:
-    """The radius of a ball about the point that lies in all bodies: next to the largest, from above."""
+    """The radius of a ball about the point that lies in all bodies, found from above and close to the largest."""
     margin = Fraction(thickness)
     for _ in range(64):
         if all(body.contains(point[None], margin)[0] for body in bodies):
@@ -308,7 +308,7 @@ def _margin(bodies: Sequence[RationalBody], point: Exact, thickness: float) -> F
 
 
 def _pull(body: RationalBody, point: Exact, vertices: Exact, fine: int) -> Exact:
-    """For each vertex the greatest share of the way to it, from a point inside, that does not leave the body."""
+    """For each vertex, the greatest share of the way from a point inside to the vertex that stays in the body."""
     pull = np.full(len(vertices), 1 << fine, object)
     outside = ~body.contains(vertices)
     if outside.any():

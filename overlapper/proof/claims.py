@@ -1,9 +1,9 @@
 """The claims of a certificate about the common part of bodies, and their check in rational arithmetic.
 
-A check trusts the numbers that define the bodies (see `overlapper.proof.rational_body`), what `overlapper.shapes` says
-of them exactly, and what is written here. It trusts neither the core nor the search that found the certificate. It
-raises `CertificateError` with the first claim that fails, and returns (lower, upper) bounds of the common volume, in
-m³, as fractions. All coordinates are in m in the world.
+A check trusts the numbers that define the bodies (see `overlapper.proof.rational_body`), the exact functions of
+`overlapper.shapes`, and this module. It trusts neither the core nor the search that found the certificate. It raises
+`CertificateError` with the first claim that fails, and returns (lower, upper) bounds of the common volume, in m³, as
+fractions. All coordinates are in m in the world.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from overlapper.proof.refusal import CertificateError as CertificateError
 from overlapper.rational import Exact, fans, integers, is_closed, root, triple
 from overlapper.shapes.planes import AXES
 
-# Bits below 1 to which shares of single cones are rounded upwards. Their sum is then as short as they are.
+# Bits below 1 to which shares of single cones are rounded up. This keeps their sum short.
 ROUNDED = 128
 
 
@@ -34,7 +34,7 @@ def require(claim: bool | np.bool_, sentence: str) -> None:
 
 
 def require_number(number: object) -> None:
-    """Refuses doubles, which would be rounded; NaN, for which no claim fails; subclasses, which compare at will."""
+    """Refuses doubles, which would be rounded, NaN, for which no claim fails, and subclasses with other comparisons."""
     whole = type(number) is int
     if type(number) is Fraction:
         over, under = number.numerator, number.denominator
@@ -43,7 +43,7 @@ def require_number(number: object) -> None:
 
 
 def require_array(name: str, value: object, *shape: int) -> None:
-    """Refuses subclasses of arrays, which may add and multiply as they like."""
+    """Refuses subclasses of arrays, which may redefine addition and multiplication."""
     is_array = type(value) is np.ndarray and value.shape == shape
     require(is_array, f"{name} must be an array of shape {shape}")
     for number in np.asarray(value, object).flat:
@@ -57,14 +57,14 @@ def require_indices(name: str, value: object, below: int) -> None:
 
 
 def require_bodies(shapes: object) -> None:
-    """Refuses subclasses of Placed, which may describe another body than the core has."""
+    """Refuses subclasses of Placed, which may describe another body than the body in the core."""
     require(type(shapes) is tuple and len(shapes) > 1, "shapes must be a tuple of two bodies or more")
     assert isinstance(shapes, tuple)
     require(all(type(shape) is Placed for shape in shapes), "shapes must be Placed")
 
 
 class Short:
-    """A claim whose text says how many numbers it holds, as there may be thousands."""
+    """A claim whose text states only the count of its numbers, because there may be thousands."""
 
     def __repr__(self) -> str:
         assert is_dataclass(self)
@@ -85,7 +85,7 @@ def _in_short(name: str, value: object) -> str:
 
 
 def _rounded(number: Fraction) -> str:
-    """A number of any exponent, to twelve digits."""
+    """A number with any exponent as text, to twelve digits."""
     return f"{Decimal(number.numerator) / Decimal(number.denominator):.12g}"
 
 
@@ -120,9 +120,9 @@ def check_balance(planes: tuple[OwnedPlane, ...]) -> None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Separated(Short):
-    """No point is below all of at most four `planes` of `shapes`: normals add up to zero, offsets to less.
+    """No point is below all of at most four `planes` of `shapes`: normals add up to zero, offsets to less than zero.
 
-    Of a pair these are the two sides of a gap. (The weights of Farkas' lemma are in the lengths of the normals.)
+    For a pair, the planes are the two sides of a gap. The lengths of the normals contain the weights of Farkas' lemma.
     """
 
     shapes: tuple[Placed, ...]
@@ -141,7 +141,7 @@ class Touching(Short):
     """The bodies nearly have a gap, and nearly have a common point.
 
     At most four `planes` of `shapes`, whose normals add up to zero, leave no room for a ball larger than `inradius`.
-    `point` (3,) is no farther than `miss` from each of the points `nearest` (m, 3), which lie one in each body.
+    The points `nearest` (m, 3) lie one in each body. `point` (3,) is no farther than `miss` from each of them.
     """
 
     shapes: tuple[Placed, ...]
@@ -173,8 +173,9 @@ class Touching(Short):
     def volume_bound(self) -> Fraction:
         """The inradius times the surface of a box around the common part.
 
-        The inner parallel bodies of a convex set have less surface than the set, and the set has less than a box around
-        it. The volume is the integral of these surfaces over depths from 0 to the inradius.
+        The inner parallel bodies of a convex set have less surface than the set. The set has less surface than a box
+        around it. The volume is the integral of the surfaces of the inner parallel bodies over depths from 0 to the
+        inradius.
         """
         bounded = [body for body in map(RationalBody, self.shapes) if body.facts.bounded]
         require(bool(bounded), "one of the bodies must be bounded")
@@ -193,13 +194,13 @@ def support_above(body: RationalBody, direction: Exact) -> Fraction:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Overlapping(Short):
-    """Planes around the common part, and a star inside of it.
+    """Planes around the common part, and a star inside the common part.
 
     A ball of radius `margin` about `point` (3,) lies in all bodies. Polygons `rings[k]` of `vertices` (n, 3),
-    counter-clockwise from outside, surround the point; number k lies in plane `facet[k]`, to rounding. `pull[v]` is in
-    (0, 1]: at that share of the way from `point` to vertex v lies a point of all bodies. The polytope of the vertices,
-    shrunk by the least `pull` about `point`, therefore fits into all bodies. `planes` are those of the bodies, of which
-    each bounds one of `shapes`.
+    counter-clockwise from outside, surround the point. Polygon k lies in plane `facet[k]`, up to rounding. `pull[v]` is
+    in (0, 1]: the point at this share of the way from `point` to vertex v lies in all bodies. The polytope of the
+    vertices, shrunk by the least `pull` about `point`, therefore lies in all bodies. Each of `planes` bounds one of
+    `shapes`.
     """
 
     shapes: tuple[Placed, ...]
@@ -246,10 +247,11 @@ class Overlapping(Short):
             require(inside.all(), f"vertex {inside.argmin()} must lie in body {number} after its pull")
 
     def _check_star(self, triangles: NDArray[np.intp], corners: Exact, six: Exact) -> None:
-        """The cones over the triangles, about the point, fill space once.
+        """Checks that the cones from the point over the triangles fill space once.
 
-        A closed surface winds about the point as often as a ray in general position leaves through it. The ray leaves
-        outwards each time if no triangle is seen from behind. A ray through an edge gives a zero.
+        The winding number of a closed surface about the point is the number of times that a ray in general position
+        leaves through it. Every crossing goes outwards if no triangle is seen from behind. A ray through an edge gives
+        a zero.
         """
         require(len(self.rings) == len(self.facet), "every polygon must have a plane")
         require(is_closed(triangles), "polygons must form a closed surface")
@@ -261,9 +263,9 @@ class Overlapping(Short):
         require(met.sum() == 1, "the surface must wind about the point once")
 
     def _reach(self, corners: Exact, unit: int) -> Exact:
-        """For each triangle, the volume below its plane of the cone over it, as a share of the cone to the triangle.
+        """For each triangle, the volume of the cone over it below its plane, as a share of the cone to the triangle.
 
-        The shares are in units of 2^-ROUNDED, and rounded up.
+        The shares are in units of 2^-ROUNDED and are rounded up.
         """
         facets = [facet for facet, ring in zip(self.facet, self.rings) for _ in ring[2:]]
         slack = [plane.offset - plane.normal @ self.point for plane in self.planes]
@@ -277,11 +279,11 @@ class Overlapping(Short):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bracketed(Short):
-    """The volume that `shapes` share, round ones among them, is not below `lower` and not above `upper`, in m³.
+    """The volume that `shapes`, which may be round, share is not below `lower` and not above `upper`, in m³.
 
-    The check computes the volume anew from the numbers of the shapes, in ball arithmetic with as many bits as it takes
-    to tell (see `overlapper.proof.volume`). It needs python-flint, whose number of bits all threads share: one check at
-    a time.
+    The check computes the volume anew from the numbers of the shapes, in ball arithmetic with as many bits as necessary
+    (see `overlapper.proof.volume`). It needs python-flint. All threads share python-flint's number of bits, so only one
+    check may run at a time.
     """
 
     shapes: tuple[Placed, ...]
@@ -306,7 +308,7 @@ class Bracketed(Short):
 
 
 def volume_bounds(shapes: Sequence[Placed], is_narrow: Callable[[Bounds], bool]) -> Bounds:
-    """Bounds of the volume that bodies share, so narrow that `is_narrow` accepts them."""
+    """Bounds of the volume that bodies share, narrow enough for `is_narrow`."""
     try:
         from overlapper.proof.volume import proved_bounds
     except ImportError as error:

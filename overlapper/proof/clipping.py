@@ -19,7 +19,7 @@ SIDES = ((0, 2, 6, 4), (1, 5, 7, 3), (0, 4, 5, 1), (2, 3, 7, 6), (0, 1, 3, 2), (
 
 
 class ClippedPolytope:
-    """A box (2, 3) at first, whose sides have the label BORDER. Every cut that removes something adds a facet."""
+    """At first a box (2, 3) whose sides have the label BORDER. Every cut that removes something adds a facet."""
 
     def __init__(self, box: Exact) -> None:
         self.points = [primitive([*corner, Fraction(1)]) for corner in product(*box.T)]
@@ -94,7 +94,7 @@ class ClippedPolytope:
     def _clip(
         self, ring: list[int], side: dict[int, int], crossings: dict[tuple[int, int], int]
     ) -> tuple[list[int], int, int]:
-        """The rest of a polygon, and the points at which it leaves through the plane and returns; or -1, -1."""
+        """The rest of a polygon, and the points at which its ring leaves through the plane and returns; or -1, -1."""
         clipped, leaves, returns = [], -1, -1
         for p, q in zip(ring, ring[1:] + ring[:1]):
             if side[p] <= 0:

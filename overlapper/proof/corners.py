@@ -1,4 +1,4 @@
-"""The polytope that planes leave of a box, with its facets, edges and corners, without rounding."""
+"""The exact polytope that planes leave of a box, with its facets, edges and corners."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from overlapper.proof.pieces import Floats, Plane
 from overlapper.proof.vectors import Vector, cross, dot, minus
 from overlapper.rational import exact
 
-# Number of planes that cut before the rest are asked again whether they are needed.
+# The number of planes that cut before the remaining planes are tested again for whether they remove anything.
 AT_ONCE = 16
 
 
@@ -36,7 +36,7 @@ class Polytope:
         return [(p, q, facet, left[q, p]) for (p, q), facet in left.items() if p < q]
 
     def volume(self) -> fmpq:
-        """From cones over the facets about the first corner."""
+        """The volume, as a sum of cones over the facets with the apex at the first corner."""
         apex, six = self.corners[0], fmpq(0)
         for facet in self.facets:
             a, *others = (minus(self.corners[p], apex) for p in facet.ring)

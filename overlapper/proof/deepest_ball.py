@@ -1,4 +1,4 @@
-"""The largest ball in the common part of bodies, and the planes that leave it no more room, in rational arithmetic."""
+"""The largest ball in the common part of bodies, and the planes that prove it, in rational arithmetic."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ def room(planes: Sequence[OwnedPlane]) -> Fraction:
 
 
 def supporting(bodies: Sequence[RationalBody], normal: Exact, owner: int) -> OwnedPlane:
-    """The plane of that normal, of any length, which one of the bodies touches from below."""
+    """The plane with the given normal, of any length, that body number `owner` touches from below."""
     return OwnedPlane(normal, support_above(bodies[owner], normal), owner)
 
 
 class DeepestBall:
     """The largest ball in the common part, by cutting planes in rational arithmetic (see methods/dual/deepest_ball.h).
 
-    The linear programme is: the largest r with normal . x + length r <= offset for all supporting planes, `length`
-    being that of the normal to rounding. Its dual weighs four planes so that the weighted normals add up to zero.
+    The linear programme is: the largest r with normal . x + length r <= offset for all supporting planes. Here `length`
+    is the length of the normal up to rounding. The dual weights four planes so that weighted normals add up to zero.
     """
 
     def __init__(self, bodies: list[RationalBody], hints: Sequence[OwnedPlane] = ()) -> None:
@@ -40,7 +40,7 @@ class DeepestBall:
             self.exchange(plane)
 
     def without_common_point(self) -> list[OwnedPlane]:
-        """Weighted planes whose normals add up to zero, and whose offsets to less."""
+        """Weighted planes whose normals add up to zero, and whose offsets add up to less than zero."""
         for _ in range(ROUNDS):
             planes = self.weighted()
             if room(planes) < 0:
@@ -53,7 +53,7 @@ class DeepestBall:
         return planes
 
     def settled(self) -> tuple[list[OwnedPlane], Exact]:
-        """Weighted planes that leave the least room, and the centre of the ball between them."""
+        """Weighted planes that leave the least room, and the centre of the largest ball between them."""
         for _ in range(ROUNDS):
             centre, radius = self.ball()
             if not self.exchange(self.tightest(centre, radius)):
@@ -72,7 +72,7 @@ class DeepestBall:
         return np.array(centre), radius
 
     def tightest(self, centre: Exact, radius: Fraction) -> OwnedPlane | None:
-        """The plane that the ball reaches through farthest; None if it is inside of all."""
+        """The plane beyond which the ball reaches farthest; None if the ball is inside all bodies."""
         found, farthest = None, Fraction(0)
         for owner, body in enumerate(self.bodies):
             plane = supporting(self.bodies, body.tightest(centre), owner)
@@ -83,7 +83,7 @@ class DeepestBall:
         return found
 
     def exchange(self, entering: OwnedPlane | None) -> bool:
-        """Puts a plane into the basis, in place of the plane that keeps all weights from getting negative."""
+        """Puts a plane into the basis. It replaces the plane whose removal keeps all weights from becoming negative."""
         if entering is None:
             return False
         share = self._solve(np.array([self._row(plane) for plane in self.basis]).T, self._row(entering))
@@ -101,7 +101,7 @@ class DeepestBall:
         return np.array([*plane.normal, Fraction(math.sqrt(plane.normal @ plane.normal))])
 
     def _simplex(self) -> list[OwnedPlane]:
-        """Four planes around one of the bodies; if none is bounded, around everything, and owned by no body."""
+        """Four planes around one of the bodies; if no body is bounded, around everything, and owned by no body."""
         directions = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * Fraction(1)
         for owner, body in enumerate(self.bodies):
             if body.facts.bounded:

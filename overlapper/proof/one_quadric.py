@@ -1,10 +1,10 @@
 """The volume that a ball or a cylinder shares with a polytope, by closed forms in ball arithmetic.
 
-Every edge of the polytope spans a triangle. For a ball, the apex is the foot of the centre on the plane of a facet; for
-a cylinder, the axis in a slice across it. In polar coordinates about the apex all integrals are elementary, and the
-signed sum over all edges is the volume. The case of a formula is decided in balls, and without rounding where the balls
-are too wide. No term jumps. So no digits are lost where a corner or an edge lies on the quadric, and more bits give
-more digits.
+Every edge of the polytope spans a triangle. For a ball, its apex is the foot of the centre on the plane of a facet. For
+a cylinder, its apex is the axis in a slice perpendicular to it. In polar coordinates about the apex, all integrals are
+elementary, and the signed sum over all edges is the volume. The case of a formula is decided in ball arithmetic, and
+exactly if the balls are too wide. All terms are continuous, so no digits are lost if a corner or an edge lies on the
+quadric, and more bits give more digits.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ def root(square: Number) -> arb:
 
 
 def in_ball(ball: Ball, polytope: Polytope) -> arb:
-    """The sum of the cones from the centre over the facets.
+    """The volume, as the sum of the cones from the centre over the facets.
 
-    Where a facet is in the ball, its cone has a third of height times area. Where the facet is outside, the cone has a
-    third of the radius times the area of the sphere that the facet covers.
+    Where a facet is in the ball, the volume of its cone is a third of height times area. Where the facet is outside,
+    the volume is a third of the radius times the area of the sphere that the facet covers.
     """
     kinds = _in_balls_or_exactly(polytope, ball.centre)
     total = arb(0)
@@ -44,7 +44,10 @@ def in_ball(ball: Ball, polytope: Polytope) -> arb:
 
 
 def in_tube(tube: Tube, polytope: Polytope) -> arb:
-    """The height of every facet over a slice across the axis, integrated over the part of its shadow in the disc."""
+    """The volume, as the integral of every facet's height over a slice perpendicular to the axis.
+
+    The domain of each integral is the part of the facet's shadow in the disc.
+    """
     kinds = _in_balls_or_exactly(polytope, tube.point, tube.axis)
     total = arb(0)
     for edge in polytope.edges():
@@ -53,7 +56,7 @@ def in_tube(tube: Tube, polytope: Polytope) -> arb:
 
 
 class _Numbers:
-    """A polytope about a point, or its shadow along an axis, in numbers of one kind."""
+    """A polytope relative to a point, or its shadow along an axis, in numbers of one kind."""
 
     def __init__(self, polytope: Polytope, kind: Callable[[fmpq], Number], centre: Vector, axis: Vector | None) -> None:
         self.polytope, self.kind = polytope, kind
@@ -74,13 +77,13 @@ class _Numbers:
         return self._corners[number]
 
     def plane(self, facet: int) -> tuple[Triple, Number]:
-        """A normal, and the level of the facet along it."""
+        """A normal of the facet, and the level of the facet along the normal."""
         plane = self.polytope.facets[facet].plane
         normal = self.triple(plane.normal)
         return normal, self.kind(plane.offset) - dot(normal, self.centre)
 
     def height(self, facet: int) -> tuple[Number, Triple] | None:
-        """(level, slope): along the unit axis a facet is at level + slope · shadow, times the length of the axis."""
+        """(level, slope): along the unit axis, a facet is at (level + slope · shadow) times the length of the axis."""
         if facet not in self._heights:
             normal, level = self.plane(facet)
             rise = dot(normal, self.axis)
@@ -100,7 +103,7 @@ def _decided(kinds: list[_Numbers], ask: Callable[[_Numbers], arb]) -> arb:
 
 
 def _cone(numbers: _Numbers, square: fmpq, facet: int) -> arb:
-    """Between the centre of a ball and a facet."""
+    """The volume in the ball between its centre and a facet."""
     normal, level = numbers.plane(facet)
     side = sign(level)
     if side == 0:
@@ -111,7 +114,7 @@ def _cone(numbers: _Numbers, square: fmpq, facet: int) -> arb:
 
 
 class _Over:
-    """Between the centre of a ball and triangles in a plane, all with a corner at the foot of the centre."""
+    """The cones from the centre of a ball over triangles in a plane, which have a corner at the foot of the centre."""
 
     def __init__(self, square: Number, normal: Triple, level: Number) -> None:
         self.square, self.normal = square, normal
@@ -133,7 +136,10 @@ class _Over:
         return side * (high - low)
 
     def _sector(self, near: Number, along: Number, length: Number, end: Number) -> arb:
-        """From the foot on the edge, at the root of `near` from the foot on the plane, to the end; odd in `along`."""
+        """The term from the foot on the edge to the end of the edge; an odd function of `along`.
+
+        The foot on the edge is at the distance sqrt(`near`) from the foot on the plane.
+        """
         side = sign(along)
         if side == 0:
             return arb(0)
@@ -186,7 +192,7 @@ class _Shadow:
         return found
 
     def _sector(self, along: Number, end: Number) -> Iterator[arb]:
-        """From the foot on the edge to an end: area, moment outwards by the foot, and sideways."""
+        """From the foot on the edge to an end: the area, and the moments outwards through the foot and sideways."""
         d, r, side = root(self.near), root(self.square), sign(along)
         way = root(along * along / self.length)
         if not is_positive(end - self.square):

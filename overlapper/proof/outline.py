@@ -1,8 +1,8 @@
 """Outlines of the slices of a convex body between quadrics and planes, found in doubles.
 
 An outline is the cyclic order of the constraints around a slice, and the corners between neighbours. It changes only at
-events, where a corner reaches a third surface, or two corners meet because the slice is tangent to an edge. All that is
-found here is a guess, which `overlapper.proof.arcs` proves or refuses.
+events. At an event, a corner reaches a third surface, or two corners meet because the slice is tangent to an edge. All
+results of this module are guesses, which `overlapper.proof.arcs` proves or refuses.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from overlapper.proof.round_frame import Barrier, Constraint
 
 Floats = NDArray[np.float64]
 
-# Directions in which a slice is seen from inside, and slices that are compared at first.
+# The number of directions from inside in which a slice is sampled, and of slices that are compared at first.
 DIRECTIONS, SLICES = 720, 25
 TURNS = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
-# Times that the directions next to each change are looked at again, and how many between two.
+# How many times the sampling around each change is refined, and the number of new directions between two.
 CLOSER, FINER = 2, 16
-# The share of its distance by which a surface may miss the outline to be asked where it meets it.
+# A surface that misses the outline by less than this share of its distance is tested for where it meets the outline.
 NEAR = 0.25
-# Steps that halve the place of an event before Newton's method.
+# The bisection steps for the place of an event before Newton's method.
 HALVINGS = 12
-# The weight of the barrier at the ends of a body, which are then known to about this share of its length.
+# The weight of the barrier at the ends of a body. The ends are then known to about this share of its length.
 END = 1e-12
 
 
@@ -68,7 +68,7 @@ class Outlines:
         return point
 
     def at(self, t: float) -> Outline | None:
-        """The outline of a slice, without its smallest sides."""
+        """The outline of a slice, in which the smallest sides may be missing."""
         p = self.inner(t)
         values, half = self._values(np.array([t, *p]))
         if not (values < 0).all():
@@ -97,7 +97,7 @@ class Outlines:
         return (half + self.linear) @ y - 1, half
 
     def _reach(self, half: Floats, values: Floats, turns: Floats) -> Floats:
-        """How far away each constraint is (k, n) in each direction."""
+        """The distance (k, n) to each constraint in each direction."""
         rays = np.array([np.cos(turns), np.sin(turns)])
         along = half[:, 1:] @ rays
         bend = np.einsum("kij,in,jn->kn", self.forms[:, 1:, 1:], rays, rays)
@@ -106,13 +106,13 @@ class Outlines:
             return np.where(under > 0, -values[:, None] / under, np.inf)
 
     def _nearest(self, half: Floats, values: Floats, turns: Floats) -> tuple[NDArray[np.intp], Floats]:
-        """The constraint that is met first in each direction, and how far away."""
+        """The constraint that is met first in each direction, and the distance to it."""
         reach = self._reach(half, values, turns)
         nearest = reach.argmin(axis=0)
         return nearest, reach[nearest, np.arange(len(turns))]
 
     def _near_misses(self, t: float) -> Iterator[float | None]:
-        """Where slices are tangent to edges, sought where one surface is next to another, but does not meet it."""
+        """Slices that are tangent to edges. They are sought where one surface is near another but does not meet it."""
         p = self.inner(t)
         values, half = self._values(np.array([t, *p]))
         reach = self._reach(half, values, TURNS[::4])
@@ -125,7 +125,7 @@ class Outlines:
                 yield self._newton(np.array([t, *(p + least[at] * ray)]), [int(nearest[at]), k], True)
 
     def corner(self, i: int, j: int, t: float, guess: Floats) -> Floats:
-        """Where two surfaces meet in a slice, by Newton's method."""
+        """The point where two surfaces meet in a slice, by Newton's method."""
         y = np.array([t, *guess])
         both = [i, j]
         for _ in range(8):
@@ -144,7 +144,7 @@ class Outlines:
         return y[1:]
 
     def events(self) -> list[float]:
-        """Where the outline changes, in order, with both ends."""
+        """The places where the outline changes, in order, and both ends."""
         low, high = float(self.low[0]), float(self.high[0])
         turn = (np.arange(SLICES) + 0.5) / SLICES * np.pi
         places = (low + high) / 2 - (high - low) / 2 * np.cos(turn)
@@ -173,7 +173,7 @@ class Outlines:
         return [event for k, event in enumerate(found) if k == 0 or event - found[k - 1] > 1e-9 * (high - low)]
 
     def _between(self, before: tuple[float, Outline | None], after: tuple[float, Outline | None]) -> list[float]:
-        """The events between outlines that differ, by Newton's method; the middle if that finds none."""
+        """The events between outlines that differ, by Newton's method; the middle if it finds none."""
         (t, left), (u, right) = before, after
         assert left is not None and right is not None
         sides = [Counter(tuple(sorted(pair)) for pair in outline.pairs()) for outline in (left, right)]
@@ -194,7 +194,7 @@ class Outlines:
         return [event for k, event in enumerate(near) if k == 0 or event - near[k - 1] > 1e-12] or [(t + u) / 2]
 
     def _newton(self, y: Floats, curves: list[int], tangent: bool) -> float | None:
-        """t where three surfaces meet, or where a slice is tangent to the edge of two."""
+        """The t at which three surfaces meet, or at which a slice is tangent to the edge of two surfaces."""
         forms, linear = self.forms[curves], self.linear[curves]
         for _ in range(30):
             image = forms @ y + linear
@@ -219,6 +219,6 @@ class Outlines:
 
 
 def cyclic(outline: Outline) -> tuple[int, ...]:
-    """The chain from its least turn on."""
+    """The chain rotated to its least rotation, so that equal cyclic orders are equal."""
     chain = outline.chain
     return min(chain[k:] + chain[:k] for k in range(len(chain)))

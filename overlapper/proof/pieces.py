@@ -1,4 +1,4 @@
-"""The blocks of placed shapes as pieces in common axes, without rounding: rotations are rational, too."""
+"""The blocks of placed shapes as exact pieces in common axes. Rotations are rational, too."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 NOTHING = fmpq(0)
 
-# Doubles that decide which pieces are apart are rounded by less than this share of the largest of them.
+# The rounding of doubles that decide which pieces are separated is less than this share of the largest of them.
 DOUBT = 2.0**-40
 
 
@@ -63,8 +63,8 @@ Quadric = Ball | Tube | Egg
 class Piece:
     """A block (see `overlapper.shapes.facts`) in common axes: the part of a quadric, if any, below planes.
 
-    It lies within `reach` of the hull of `spine` (k, 3), in doubles; `spine` is None if the piece has no end. Its
-    planes cut off no more than the volume `lost` of the body.
+    It lies within `reach` of the hull of `spine` (k, 3), in doubles; `spine` is None if the piece is unbounded. Its
+    planes cut off at most the volume `lost` of the body.
     """
 
     quadric: Quadric | None
@@ -75,7 +75,7 @@ class Piece:
 
 
 class Frame:
-    """The map from the axes of a body, and from its half axes as units, if it has some, to the axes of `home`."""
+    """The map from the axes of a body, in units of its half axes, if it has any, to the axes of `home`."""
 
     def __init__(self, body: RationalBody, home: RationalBody) -> None:
         turn = home.axes.T @ body.axes

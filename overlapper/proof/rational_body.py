@@ -1,7 +1,7 @@
-"""Placed shapes in rational arithmetic: a double is a rational number, so all that it says can be taken exactly.
+"""Placed shapes in rational arithmetic. Every double is a rational number, so its value can be taken exactly.
 
-Only what defines a shape is used: radii, lengths, half extents, corners of hulls, normals and offsets as given,
-position, quaternion. A quaternion stands for the exact rotation of its direction.
+Only the numbers that define a shape are used: radii, lengths, half extents, corners of hulls, given normals and
+offsets, position, quaternion. A quaternion of any length stands for the exact rotation by its direction.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from overlapper.shapes.table import facts
 
 
 class RationalBody:
-    """A placed shape as its numbers say, without any rounding; all points and directions are in the world."""
+    """A placed shape exactly as its numbers define it. All points and directions are in the world frame."""
 
     def __init__(self, placed: Placed) -> None:
         self.facts = facts(placed.shape)
@@ -32,21 +32,21 @@ class RationalBody:
         return found and (direction @ self.position + found[0], found[1])
 
     def is_below(self, direction: Exact, offset: Fraction) -> bool:
-        """Whether the body lies in { x : direction . x <= offset }: the squares are compared, no root is taken."""
+        """Whether the body lies in { x : direction . x <= offset }. Squares are compared, so no root is needed."""
         support = self.support(direction)
         return support is not None and support[0] <= offset and support[1] <= (offset - support[0]) ** 2
 
     def contains(self, points: Exact, margin: Fraction | int = 0, scale: int = 1) -> NDArray[np.bool_]:
         """Whether the body holds a ball of radius `margin` about each of the points (n, 3) / scale.
 
-        True is proved. False may be said of a ball that just fits (see `Facts.holds`).
+        True is proved. False may be returned for a ball that just fits (see `Facts.holds`).
         """
         numbers, unit = integers(np.vstack([points, scale * self.position]))
         local = (numbers[:-1] - numbers[-1]) @ self._turn[0]
         return self.facts.holds(local, scale * unit * self._turn[1], margin)
 
     def facing(self, normal: NDArray[np.float64]) -> Exact:
-        """The exact normal of the flat side whose rounded unit normal is given; the same normal on a round body."""
+        """The exact normal of the flat side whose rounded unit normal is given; for a round body, `normal` itself."""
         if self.facts.planes is None:
             same: Exact = exact(normal)
             return same
@@ -54,14 +54,14 @@ class RationalBody:
         return direction
 
     def tightest(self, point: Exact) -> Exact:
-        """The normal of the plane of the body that a point is farthest above."""
+        """The normal of the plane of the body above which a point is highest."""
         normal: Exact = self.axes @ self.facts.tightest((point - self.position) @ self.axes)
         return normal
 
     def exits(self, start: Exact, arms: Exact, fine: int) -> Exact:
-        """Shares (n,) of `arms` (n, 3) along which one gets from `start`, a point inside, without leaving the body.
+        """The greatest shares (n,) of `arms` (n, 3) that stay in the body from `start`, a point inside.
 
-        The greatest, not above 1, in units of 2^-fine and rounded down.
+        The shares are at most 1, in units of 2^-fine and rounded down.
         """
         numbers, unit = integers(np.vstack([arms, start - self.position]))
         local = numbers @ self._turn[0]

@@ -8,4 +8,4 @@ Bounds = tuple[Fraction, Fraction]
 
 
 class CertificateError(ValueError):
-    """A claim that is false, or a case for which no certificate was found; one sentence says which."""
+    """A claim that is false, or a case for which no certificate was found. The text is one sentence."""

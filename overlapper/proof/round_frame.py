@@ -1,8 +1,9 @@
 """An affine frame in which the common part of convex bodies is about as long as wide, found in doubles.
 
-Each constraint is { x : x'Qx + 2 b·x + c <= 0 } with a form Q that has no negative value. The frame is that of Dikin's
-ellipsoid about the analytic centre (Nesterov and Nemirovskii, 1994): the common part holds the unit ball, and lies in a
-ball whose radius is the number of constraints. Doubles only choose the frame. Its numbers are then taken exactly.
+Each constraint is { x : x'Qx + 2 b·x + c <= 0 } with a form Q that has no negative value. The frame is the frame of
+Dikin's ellipsoid about the analytic centre (Nesterov and Nemirovskii, 1994). In it, the common part holds the unit ball
+and lies in a ball whose radius is the number of constraints. Doubles only choose the frame. Its numbers are then taken
+exactly.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ Matrix = tuple[Vector, Vector, Vector]
 HALF = fmpq(1, 2)
 UNIT: Matrix = (vector([1, 0, 0]), vector([0, 1, 0]), vector([0, 0, 1]))
 
-# Frames that are tried, each about the centre found in the one before; and steps of Newton's method in one of them.
+# The most frames, each about the centre found in the frame before; and the most steps of Newton's method in a frame.
 FRAMES, STEPS = 40, 60
-# The least second derivative that is believed, as a share of the greatest.
+# The least second derivative that is trusted, as a share of the greatest.
 FLAT = 1e-13
 
 
@@ -48,7 +49,7 @@ class Constraint:
         return Constraint((form[0], form[1], form[2]), linear, self.value(origin))
 
     def in_doubles(self) -> Floats:
-        """(10,): the form's upper half, the linear part, and the constant; divided by the largest of them."""
+        """(10,): the upper half of the form, the linear part and the constant, divided by the largest of these."""
         (a, b, c), (_, d, e), (_, _, f) = self.form
         numbers = [a, b, c, d, e, f, *self.linear, self.constant]
         size = max(abs(x) for x in numbers)
@@ -85,7 +86,7 @@ def _about(centre: Vector, form: Matrix, square: fmpq) -> Constraint:
 
 
 def scale_of(form: Matrix, other: Matrix) -> fmpq:
-    """The factor that makes a form the other, if one does."""
+    """The factor that turns `form` into `other`, if they are proportional."""
     return (other[0][0] + other[1][1] + other[2][2]) / (form[0][0] + form[1][1] + form[2][2])
 
 
@@ -101,7 +102,7 @@ def within(plane: Plane, egg: Egg) -> Plane:
 
 
 def newton(hessian: Floats, gradient: Floats) -> Floats:
-    """The step of Newton's method; none where doubles see no curvature."""
+    """The step of Newton's method. It is zero if the matrix of second derivatives is singular in doubles."""
     try:
         step = np.array(np.linalg.solve(hessian, gradient), np.float64)
     except np.linalg.LinAlgError:
@@ -110,7 +111,7 @@ def newton(hessian: Floats, gradient: Floats) -> Floats:
 
 
 class Barrier:
-    """Constraints in doubles: values, gradients and forms of all at one point."""
+    """Constraints in doubles: values, gradients and forms of all constraints at one point."""
 
     def __init__(self, constraints: list[Constraint]) -> None:
         rows = np.array([constraint.in_doubles() for constraint in constraints])
@@ -123,9 +124,9 @@ class Barrier:
         return (image + self.linear) @ y + self.constant, image
 
     def centre(self, y: Floats, towards: Floats | None = None) -> tuple[Floats, Floats]:
-        """The analytic centre from a point inside, and the barrier's second derivatives there.
+        """The analytic centre, found from a point inside, and the second derivatives of the barrier there.
 
-        With `towards`, the least of towards · y plus the barrier.
+        With `towards`, the minimum of towards · y plus the barrier instead of the centre.
         """
         pull = np.zeros(3) if towards is None else towards
         hessian = np.eye(3)
@@ -146,9 +147,9 @@ class Barrier:
         return y, hessian
 
     def inside(self, y: Floats, radius: float) -> tuple[Floats, Floats, Floats | None]:
-        """From any point: a point inside, second derivatives, and None; or the weights of the constraints that exclude.
+        """From any point: a point inside, second derivatives, and None; or weights of constraints that exclude a point.
 
-        The greatest value falls along a path, by a barrier in four variables, in a ball about the start.
+        A barrier in four variables, in a ball about the start, gives a path along which the greatest value falls.
         """
         scale = np.sqrt((self.linear**2).sum(axis=1)) + np.abs(self.forms).max(axis=(1, 2)) + 1e-300
         start, level = y.copy(), float((self.at(y)[0] / scale).max()) + 1.0
@@ -197,12 +198,12 @@ class RoundFrame:
     unit: fmpq
 
 
-# A rotation without any special angle. No plane that a user is likely to give is then parallel to slices.
+# A rotation without special angles, so that planes of users are unlikely to be parallel to slices.
 GENERIC = np.linalg.qr(np.array([[0.5377, 0.8622, -0.4336], [1.8339, 0.3188, 0.3426], [-2.2588, -1.3077, 3.5784]]))[0]
 
 
 def framed(constraints: list[Constraint], around: Floats) -> RoundFrame | arb:
-    """The frame in which the common part is round; or bounds of its volume, if no point inside of all was found."""
+    """The frame in which the common part is round; or bounds of its volume, if no point inside all was found."""
     middle, half = around.mean(axis=0), np.ptp(around, axis=0) / 2
     origin, size = vector(middle.tolist()), float(half.max())
     columns = exact_columns(np.eye(3) * size)
@@ -239,7 +240,7 @@ def framed(constraints: list[Constraint], around: Floats) -> RoundFrame | arb:
 
 
 def excluded(local: list[Constraint], weights: Floats) -> arb:
-    """A bound of the volume in which a weighted sum of the constraints is not positive."""
+    """A bound of the volume of the set where a weighted sum of the constraints is not positive."""
     form = [[fmpq(0)] * 3 for _ in range(3)]
     linear, constant = [fmpq(0)] * 3, fmpq(0)
     for constraint, weight in zip(local, weights / weights.max()):
@@ -297,7 +298,7 @@ def product(columns: Matrix, right: Floats) -> Matrix:
 
 
 def short(numbers: Vector) -> Vector:
-    """The numbers, rounded to some digits, so that fractions stay short; any frame will do."""
+    """The numbers rounded to some digits, so that fractions stay short. Any frame is valid."""
     return vector([double(x) for x in numbers])
 
 

@@ -1,15 +1,15 @@
-"""Proved bounds of the signed distance of a pair: the arbiter when two programs differ.
+"""Proved bounds of the signed distance of a pair, to decide which of two programs is right when they differ.
 
-The signed distance is positive apart (the distance) and negative in overlap (minus the depth). In the Minkowski
-difference D = A - B it is the distance from the origin to the boundary of D. So every direction gives a lower bound, by
-the two support values, and every polytope with vertices in D gives an upper one. The polytope grows at its feature
-nearest to the origin until the bounds meet (van den Bergen, Collision Detection in Interactive 3D Environments, 2003,
-section 4.3). It is built anew each time, because an arbiter is seldom asked.
+The signed distance is the distance of separated bodies, and minus the depth of overlapping bodies. In the Minkowski
+difference D = A - B, it is the signed distance from the origin to the boundary of D. Every direction therefore gives a
+lower bound, by the two support values. Every polytope with vertices in D gives an upper bound. The polytope grows at
+its feature nearest to the origin until the bounds meet (van den Bergen, Collision Detection in Interactive 3D
+Environments, 2003, section 4.3). Its hull is built anew in each step, because these bounds are seldom needed.
 
-A ball is left out of each shape that is the sum of a ball and a core, and the radii are subtracted in the end.
+If a shape is the sum of a ball and a core, the ball is left out, and its radius is subtracted at the end.
 
-Doubles only propose directions, vertices and facets. The bounds are evaluated in rational arithmetic on the very
-doubles that describe the pair, and rounded once, outwards. Only points on the rim of a cylinder are irrational; they
+Doubles only propose directions, vertices and facets. The bounds are evaluated in rational arithmetic on the exact
+doubles that describe the pair, and rounded once, outwards. Only points on the rim of a cylinder are irrational. They
 are rounded to doubles in its own frame, to 1e-16 of its size.
 """
 
@@ -31,10 +31,10 @@ from overlapper.shapes.nearest import nearest_weights
 
 Floats = NDArray[np.float64]
 
-# Three exact divisions and roots, each rounded correctly, and their product.
+# Three divisions and roots, each rounded correctly, and their product.
 OUTWARDS = 4 * 2.0**-52
 
-# The most steps. Polyhedra end by themselves. Rims gain about a digit in ten steps; coaxial rims keep wide bounds.
+# The most steps. Polyhedra finish by themselves. Rims gain about a digit in ten steps; coaxial rims keep wide bounds.
 STEPS = 100
 
 # The directions to the 26 neighbours of a cell.
@@ -44,12 +44,12 @@ NEIGHBOURS = np.array([direction for direction in product((-1.0, 0.0, 1.0), repe
 def signed_distance_bounds(
     a: Placed, b: Placed, directions: Iterable[Floats] = (), resolution: float = 0.0
 ) -> tuple[float, float]:
-    """(lower, upper), in m, around the exact signed distance: positive apart, minus the depth in overlap.
+    """(lower, upper), in m, around the exact signed distance: the distance if separated, minus the depth in overlap.
 
-    `directions`, (3,) each, in the world frame, are tried first: the normals, from A to B, that somebody claims. The
-    search stops when the bounds are `resolution` m apart, or as near as they get.
+    `directions`, (3,) each, in the world frame, are tried first. They are normals, from A to B, of claimed answers.
+    The search stops when the bounds differ by `resolution` m, or cannot become closer.
     """
-    # A half-space ends only across its plane, so that direction sees the signed distance itself.
+    # A half-space is bounded only along its normal, so this direction gives the signed distance itself.
     bodies = RationalBody(a), RationalBody(b)
     for body, sign in zip(bodies, (1, -1)):
         if not body.facts.bounded:
@@ -78,7 +78,7 @@ class Difference:
         self.outward = NEIGHBOURS[0]
         for outward in NEIGHBOURS:
             self.extend(outward)
-        # In a thin solid they may lie on a line or plane. Going both ways across it, twice, leaves it.
+        # In a thin solid, the points may lie on a line or plane. Two steps in both directions across it leave it.
         for _ in range(2):
             points = np.array(list(self.points))
             for axis in np.linalg.svd(points - points.mean(axis=0))[2]:
@@ -86,7 +86,7 @@ class Difference:
                 self.extend(-axis)
 
     def extend(self, outward: Floats) -> bool:
-        """Adds a farthest point of A - B along `outward`; False if it is there already."""
+        """Adds a farthest point of A - B along `outward`. False if the point is already a vertex."""
         point = self.offset
         for body, sign in zip(self.bodies, (1.0, -1.0)):
             local = body.facts.core_tip((body.axes.T @ exact(sign * outward)).astype(float))
@@ -105,7 +105,7 @@ class Difference:
         points = np.array(list(self.points))
         try:
             hull = Hull(points)
-        except ValueError:  # flat: a point, segment or parallelogram of balls and capsules, or of very thin plates
+        except ValueError:  # flat: a point, segment or parallelogram, from balls and capsules or from very thin plates
             across = np.linalg.svd(points - points.mean(axis=0))[2][2]
             return np.array(list(combinations_with_replacement(points, 3))), np.array([[*across, 0.0]])
         fans = [(ring[0], ring[i], ring[i + 1]) for ring in hull.facets for i in range(1, len(ring) - 1)]
@@ -120,7 +120,7 @@ class Difference:
         points = np.einsum("ki,kij->kj", nearest_weights(triangles), triangles)
         distances = np.linalg.norm(points, axis=1)
         row = distances.argmin()
-        # The way back from a nearest point that is next to the origin is all rounding; the facet's normal is not.
+        # If the nearest point is very near the origin, its direction is only rounding; the facet's normal is reliable.
         return [facet[:3], -points[row]] if distances[row] > 0.0 else [facet[:3]], float(distances[row])
 
     def certified(self) -> tuple[float, float]:
@@ -138,7 +138,7 @@ class Difference:
         return lower, upper - self.radius + OUTWARDS * (abs(upper) + self.radius)
 
     def _inscribed_radius(self, triangles: Floats, nearest: Floats) -> float | None:
-        """The radius of a ball about the origin inside the surface; None if that is open or the origin outside."""
+        """The radius of a ball about the origin inside the surface; None if it is open or the origin is outside."""
         edges = Counter((tuple(t[i]), tuple(t[i - 1])) for t in triangles for i in range(3))
         if any(count != edges[edge[::-1]] for edge, count in edges.items()):
             return None
@@ -147,13 +147,13 @@ class Difference:
             corners = np.array([self.points[tuple(corner)] for corner in triangle])
             normal = cross(corners[1] - corners[0], corners[2] - corners[0])
             angle += _solid_angle(triangle, normal @ corners[0])
-            # The triangle is beyond each of these planes; the second serves where it has next to no area.
+            # The triangle is beyond each of these planes; the second is for triangles with almost no area.
             radius = min(radius, max(_least(corners, normal), _least(corners, exact(point))))
         return radius if abs(angle - 4.0 * math.pi) < 1.0 and radius > 0.0 else None
 
 
 def _gap(a: RationalBody, b: RationalBody, outward: Exact) -> tuple[float, float]:
-    """The gap of the supports along a direction from A to B, rounded down and up."""
+    """The gap between the supports along a direction from A to B, rounded down and up."""
     flat, curved = Fraction(0), 0.0
     for body, direction in ((a, outward), (b, -outward)):
         support = body.support(direction)
@@ -165,16 +165,16 @@ def _gap(a: RationalBody, b: RationalBody, outward: Exact) -> tuple[float, float
 
 
 def _solid_angle(triangle: Floats, volume: Fraction) -> float:
-    """The angle, in steradian, under which the origin sees a triangle: negative from outside.
+    """The solid angle, in steradian, of a triangle seen from the origin: negative from outside.
 
-    Seen from within a closed surface they sum to 4 pi, from without to 0 (van Oosterom and Strackee, 1983). `volume` is
-    the triple product of the corners, whose sign must be right where the origin is next to the triangle.
+    The solid angles of a closed surface sum to 4 pi from within, and to 0 from outside (van Oosterom and Strackee,
+    1983). `volume` is the triple product of the corners. Its sign must be right if the origin is near the triangle.
     """
     (p, q, r), (a, b, c) = triangle, np.linalg.norm(triangle, axis=1)
     return 2.0 * math.atan2(float(volume), a * b * c + (p @ q) * c + (q @ r) * a + (r @ p) * b)
 
 
 def _least(corners: Exact, normal: Exact) -> float:
-    """How far along `normal` the nearest of the corners is."""
+    """The least distance along `normal` of the corners from the origin."""
     squared = normal @ normal
     return float(min(corners @ normal)) / math.sqrt(squared) if squared else 0.0

@@ -1,4 +1,4 @@
-"""Signs of numbers that are exact, or known to lie in a ball that may be too wide to tell."""
+"""Signs of numbers that are exact, or that lie in a ball that may be too wide to decide the sign."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from flint import arb, fmpq
 
 
 class Undecided(ArithmeticError):
-    """A ball is too wide for a sign."""
+    """A ball is too wide to decide a sign."""
 
 
 def is_positive(x: arb | fmpq) -> bool:

@@ -1,17 +1,17 @@
 """Volumes of two quadrics and a polytope, by slices, in ball arithmetic.
 
-A slice is parallel to the axes of all cylinders. It shows a cylinder as a strip between two lines, a ball as a disc,
-and the polytope as a polygon. Each of the lines keeps its direction and has the offset b₀ + b₁ t + b₂ ρ₁(t) + b₃ ρ₂(t).
-Here t is along the normal of the slices, and ρ(t)² is quadratic. So the area of a polygon is a quadratic form in 1, t,
-ρ₁ and ρ₂. Its integral is elementary but for ρ₁ ρ₂. Integrals that are not elementary are computed by `acb.integral`
-(Petras; Johansson, Numerical integration in arbitrary-precision ball arithmetic, 2018), whose error is proved.
+A slice is parallel to the axes of all cylinders. In a slice, a cylinder is a strip between two lines, a ball is a disc,
+and the polytope is a polygon. Each line keeps its direction and has the offset b₀ + b₁ t + b₂ ρ₁(t) + b₃ ρ₂(t). Here t
+is along the normal of the slices, and ρ(t)² is quadratic. So the area of a polygon is a quadratic form in 1, t, ρ₁ and
+ρ₂. Its integral is elementary except for ρ₁ ρ₂. Integrals that are not elementary are computed by `acb.integral`, whose
+error is proved (Petras; Johansson, Numerical integration in arbitrary-precision ball arithmetic, 2018).
 
-The sides of a slice and their order change only at breakpoints. There three of the curves that bound slices meet in a
-point of the common body, or a line touches the disc in such a point. At other breakpoints parallel lines meet, or a
+The sides of a slice and their order change only at breakpoints. At some breakpoints, three curves that bound slices
+meet in a point of the common body, or a line touches the disc in such a point. At others, parallel lines meet, or a
 strip or the disc ends. These t are roots of polynomials with rational coefficients, of degree four or less, which FLINT
 encloses. Superfluous breakpoints do no harm. Three sides of the polytope meet only in its corners, and two only in its
-edges; an edge that lies in a slice is a place where parallel lines meet. Between breakpoints too close to tell apart, a
-slice has at most the widest area.
+edges. Where an edge lies in a slice, parallel lines meet. Between breakpoints that are too close to separate, a slice
+has at most the widest area.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from overlapper.proof.one_quadric import root
 from overlapper.proof.signs import is_positive
 from overlapper.proof.vectors import Vector, minus
 
-# A line takes { (p, q) : normal · (p, q) <= offset }, whose offset is a combination of 1, t, ρ₁ and ρ₂.
+# A line bounds { (p, q) : normal · (p, q) <= offset }. The offset is a combination of 1, t, ρ₁ and ρ₂.
 Combination = tuple[fmpq, fmpq, fmpq, fmpq]
 Point = tuple[arb, arb, arb]  # (t, p, q)
 ZERO = fmpq(0)
 T = fmpq_poly([0, 1])
 
-# The share between two breakpoints at which a slice is looked at. In the middle, symmetry may make more lines meet.
+# The share between two breakpoints at which a slice is examined. In the middle, symmetry may make more lines meet.
 SHARE = fmpq(3331, 7919)
 
 # The share of the bits of a number to which an integral that is not elementary is computed.
 INTEGRATED = 0.75
-# SPARE: bits that rounding may take from an integral. The number of evaluations is limited to the square of the bits
+# SPARE: bits that an integral may lose by rounding. The number of evaluations is limited to the square of the bits
 # divided by EVALUATIONS, and to MOST_EVALUATIONS, which take seconds.
 SPARE, EVALUATIONS, MOST_EVALUATIONS = 16, 2, 1 << 16
 
@@ -61,11 +61,11 @@ class SliceArea:
 
 
 class Slices:
-    """A volume by slices. Coordinates t, p, q are rational combinations of those of space."""
+    """A volume by slices. Coordinates t, p, q are rational combinations of the coordinates of space."""
 
     corners: list[Vector]  # of the polytope
     edges: list[tuple[int, int, int, int]]
-    lines: list[Line]  # of which the first four are a parallelogram, counter-clockwise
+    lines: list[Line]  # the first four are a parallelogram, counter-clockwise
     squares: tuple[fmpq_poly, ...]  # ρ₁² and, for two cylinders, ρ₂²
     steep: list[tuple[fmpq, fmpq]]  # (rate, offset) of planes rate t <= offset
 
@@ -131,7 +131,7 @@ class Slices:
         return any(rate * t > offset for rate, offset in self.steep)
 
     def level_edges(self) -> Iterator[arb]:
-        """The slices that hold whole edges: a part of such an edge may be in the quadrics when its ends are not."""
+        """The slices that hold whole edges. A part of such an edge may be in the quadrics although its ends are not."""
         for i, j, _, _ in self.edges:
             if self.corners[i][0] == self.corners[j][0]:
                 yield arb(self.corners[i][0])
@@ -140,7 +140,7 @@ class Slices:
         return [arb(1), t, *(at(square, t).nonnegative_part().sqrt() for square in self.squares)]
 
     def polygon(self, offsets: list[arb]) -> list[tuple[int, tuple[arb, arb]]]:
-        """The lines around the polygon below all of them, and where each meets the next; empty without a polygon."""
+        """The lines around the polygon below all lines, and where each meets the next; empty without a polygon."""
         around = [(k, self.meeting(k, (k + 1) % 4, offsets)) for k in range(4)]
         for new in range(4, len(self.lines)):
             x, y = self.lines[new].normal
@@ -192,7 +192,7 @@ def product(u: Combination, v: Combination) -> Form:
 
 
 def clusters(marks: Iterable[arb]) -> list[tuple[arb, arb]]:
-    """Bounds of the marks, in order; bounds that overlap are put together."""
+    """Bounds of the marks, in order. Bounds that overlap are merged."""
     found: list[tuple[arb, arb]] = []
     for low, high in sorted(((mark.lower(), mark.upper()) for mark in marks), key=lambda pair: pair[0].mid()):
         if found and not found[-1][1] < low:
@@ -229,13 +229,13 @@ def roots(poly: fmpq_poly) -> list[arb]:
 
 
 def along(start: Vector, end: Vector, form: Callable[[Vector, Vector], fmpq], constant: fmpq) -> list[arb]:
-    """Shares of the way at which the form of a point with itself is the constant."""
+    """Shares of the way from start to end at which the form of a point with itself is the constant."""
     way = minus(end, start)
     return roots(fmpq_poly([form(start, start) - constant, 2 * form(start, way), form(way, way)]))
 
 
 def points_between(start: Vector, end: Vector, shares: Iterable[arb]) -> Iterator[Point]:
-    """The points at shares of the way, without those that are certainly beyond its ends."""
+    """The points at shares of the way from start to end, without points that are certainly beyond the ends."""
     for share in shares:
         if not (share < 0 or share > 1):
             t, p, q = (x + share * (y - x) for x, y in zip(start, end))
@@ -282,10 +282,10 @@ def of_form(squares: tuple[fmpq_poly, ...], low: arb, high: arb) -> list[arb]:
 
 
 def integrated(f: Callable[[acb, bool], acb], low: arb, high: arb, most: arb, goal: int) -> arb:
-    """The integral of a function that is not more than `most`, between ends that are known to rounding.
+    """The integral of a function of at most `most`, between ends that are known up to rounding.
 
     Smaller steps gain nothing below the rounding of `most`, and the number of steps is limited. The worst interval is
-    halved first. So if a root begins at an end, the interval that is left when all steps are spent is narrow.
+    halved first. If a root begins at an end, the interval that remains after all steps is therefore narrow.
     """
     start, end = low.mid(), high.mid()
     rounding = most * (end - start) * arb(2) ** (SPARE - ctx.prec)

@@ -1,4 +1,4 @@
-"""The volume that two crossing cylinders and a polytope share: a slice is a parallelogram, cut by lines."""
+"""The volume that two crossing cylinders and a polytope share. A slice is a parallelogram, cut by lines."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from overlapper.proof.vectors import cross, dot, minus
 
 
 class TwoTubes(Slices):
-    """Coordinates t along the normal of both axes, and p and q across each of them."""
+    """Coordinates: t along the common normal of both axes, p and q perpendicular to each axis."""
 
     def __init__(self, one: Tube, other: Tube, polytope: Polytope) -> None:
         a, b = one.axis, other.axis
@@ -72,7 +72,7 @@ class TwoTubes(Slices):
         return root(self.most)
 
     def is_outside(self, point: Point, unknown: int = -1) -> bool:
-        """Whether the point is certainly outside, for every value of the coordinate that is unknown."""
+        """Whether the point is certainly outside, for every value of the coordinate with the number `unknown`."""
         t, p, q = point
         for k, (x, level, square) in enumerate(zip((p, q), self.levels, self.squares)):
             off = arb(0) if k == unknown else x - level
@@ -124,7 +124,7 @@ class TwoTubes(Slices):
         return SliceArea(forms=list(zip([ids[-1], *ids], ids, [*ids[1:], ids[0]])))
 
     def form(self, before: int, line: int, after: int) -> Form:
-        """Twice the area between the origin and the part of a line between two others."""
+        """Twice the area between the origin and the part of a line between two other lines."""
         key = (before, line, after)
         if key not in self._forms:
             (p, q), (u, v) = self.corner(before, line), self.corner(line, after)
@@ -142,7 +142,7 @@ class TwoTubes(Slices):
         return total / 2
 
     def _of_both(self, low: arb, high: arb, goal: int) -> arb:
-        """The integral of ρ₁ ρ₂: elliptic unless they are proportional, and analytic in the angle that is used."""
+        """The integral of ρ₁ ρ₂. It is elliptic unless they are proportional, and analytic in the angle used here."""
         p, q = self.squares
         if all(p[i] * q[2] == q[i] * p[2] for i in (0, 1)):
             share = root(q[2] / p[2])

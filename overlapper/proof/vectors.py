@@ -50,7 +50,7 @@ def scaled(u: tuple[N, N, N], share: N | int) -> tuple[N, N, N]:
 
 
 def across(u: Vector) -> Vector:
-    """A vector orthogonal to one that is not zero."""
+    """A vector orthogonal to a given vector that is not zero."""
     least = min(range(3), key=lambda k: abs(u[k]))
     axis = [fmpq(0)] * 3
     axis[least] = fmpq(1)

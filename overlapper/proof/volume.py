@@ -1,6 +1,6 @@
-"""Bounds of the volume that bodies share, as narrow as asked for: each piece of one with each piece of the others.
+"""Bounds of the volume that bodies share, as narrow as requested: a sum over combinations of one piece of each body.
 
-Decisions are made without rounding, or by balls that do not hold zero. Where a ball holds zero, more bits are taken.
+Decisions are exact, or use balls that do not contain zero. If a ball contains zero, more bits are used.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from overlapper.proof.slices import Slices
 from overlapper.proof.two_tubes import TwoTubes
 from overlapper.proof.vectors import ORIGIN, dot, fraction, minus, plus, scaled
 
-# Bits of a first try, and of a last one, after which doubt is taken for a fault of the input.
+# The bits of the first try and of the last try. A sign that is then undecided is reported as a fault of the input.
 FIRST, LAST = 128, 1 << 11
-# The last try where slices bounded by arcs are needed. More bits take a second and more for each of them.
+# The bits of the last try if slices bounded by arcs are needed. With more bits, each of them takes a second or more.
 LAST_BY_ARCS = 192
-# A summand is computed again while all doubts together exceed one part in ENOUGH of the volume.
+# A summand is computed again while all uncertainties together exceed one part in ENOUGH of the volume.
 ENOUGH = 1 << 60
-# Bits at which an undecided sign is taken for a sign that no bits decide.
+# If a sign is undecided with this many bits, it is assumed that more bits do not decide it.
 TIED = 512
 
 
@@ -57,13 +57,13 @@ class Common:
 
     @property
     def last(self) -> int:
-        """The most bits that are worth a try."""
+        """The most bits to try."""
         return LAST_BY_ARCS if any(isinstance(each, ByArcs) for each in self._summands) else LAST
 
     def bounds(self, bits: int) -> Bounds | None:
-        """Bounds by numbers of so many bits; None if these are too few for one of the summands.
+        """Bounds by numbers with `bits` bits; None if these are too few for one of the summands.
 
-        A summand that is known well enough is not computed again.
+        A summand that is known accurately enough is not computed again.
         """
         with ctx.workprec(bits):
             wide = [k for k, volume in enumerate(self._known) if volume is None or volume.rad() > self._enough]
@@ -86,10 +86,10 @@ Summand = Callable[[int], arb]
 
 
 class OrBetween:
-    """A volume by slices, or bounds of it by a thinner and a thicker cylinder.
+    """A volume by slices, or bounds of the volume by a thinner and a thicker cylinder.
 
-    Where a plane goes through the curve in which the quadrics meet, three sides of every slice meet, and no bits tell
-    their order. For the thinner and the thicker cylinder some bits do.
+    If a plane contains the curve in which the quadrics meet, three sides of every slice meet, and no number of bits
+    decides their order. For the thinner and the thicker cylinder, some number of bits does.
     """
 
     def __init__(self, slices: Callable[[Tube], Slices], tube: Tube) -> None:
@@ -108,7 +108,7 @@ class OrBetween:
 
 
 def finite(number: arb) -> arb:
-    """The number, if it has bounds. Undecided if it has none: two sides meet where an integral ends."""
+    """The number, if it has bounds. Undecided if it has none, because two sides meet where an integral ends."""
     if not number.is_finite():
         raise Undecided
     return number
@@ -128,7 +128,7 @@ class _Pieces:
         self._planes: dict[int, Floats] = {}
 
     def near(self, other: _Pieces) -> Iterator[tuple[int, int]]:
-        """Pairs of pieces that are not apart as far as doubles can tell."""
+        """Pairs of pieces that are not proved to be separated in doubles."""
         lower, upper = self.boxes[:, None, 0], self.boxes[:, None, 1]
         apart = (lower >= other.boxes[None, :, 1]) | (upper <= other.boxes[None, :, 0])
         for i, j in np.argwhere(~apart.any(axis=2)):
@@ -136,7 +136,7 @@ class _Pieces:
                 yield int(i), int(j)
 
     def _parted(self, i: int, other: _Pieces, j: int) -> bool:
-        """Whether all of the other's piece is beyond one plane of the piece."""
+        """Whether the whole piece j of the other body is beyond one plane of piece i."""
         spine, reach = other.pieces[j].spine, other.pieces[j].reach
         if spine is None:
             return False
@@ -164,7 +164,7 @@ def in_doubles(plane: Plane) -> list[float]:
 
 
 def _near(bodies: list[_Pieces]) -> Iterator[list[Piece]]:
-    """One piece of each body, where no two are apart as far as doubles can tell."""
+    """Combinations of one piece of each body, without two pieces that are proved to be separated in doubles."""
     first, *others = bodies
     near = [{tuple(pair) for pair in one.near(other)} for one, other in combinations(bodies, 2)]
     number = {pair: k for k, pair in enumerate(combinations(range(len(bodies)), 2))}
@@ -181,7 +181,7 @@ def _near(bodies: list[_Pieces]) -> Iterator[list[Piece]]:
 
 
 def summands(together: list[Piece]) -> list[Summand]:
-    """The common part of pieces, as volumes that wait to be computed."""
+    """The common part of pieces, as volumes to be computed later."""
     boxes = [box(piece) for piece in together]
     around = np.array([np.max([each[0] for each in boxes], axis=0), np.min([each[1] for each in boxes], axis=0)])
     if (around[0] >= around[1]).any():
@@ -191,7 +191,10 @@ def summands(together: list[Piece]) -> list[Summand]:
 
 
 def _of_all(quadrics: list[Quadric], planes: tuple[Plane, ...], around: Floats) -> list[Summand]:
-    """Quadrics of the same form differ by a linear function, so that on one side of a plane one of them bounds."""
+    """The volume of quadrics below planes, as summands.
+
+    Quadrics of the same form differ by a linear function, so a plane separates the parts of space in which each bounds.
+    """
     classes: list[list[Quadric]] = []
     for quadric in quadrics:
         alike = next((those for those in classes if is_alike(those[0], quadric)), None)
@@ -207,7 +210,7 @@ def _of_all(quadrics: list[Quadric], planes: tuple[Plane, ...], around: Floats) 
 
 
 def _cells(alike: list[Quadric]) -> Iterator[tuple[Quadric, tuple[Plane, ...]]]:
-    """Each of some quadrics of the same form, and planes of the part of space in which it is the one that bounds."""
+    """Each of some quadrics of the same form, with the planes of the part of space in which this quadric bounds."""
     functions = [constraint(quadric) for quadric in alike]
     for k, one in enumerate(functions):
         cell: list[Plane] = []
@@ -292,7 +295,7 @@ def _sliced(slices: Callable[[Tube, Polytope], Slices], tube: Tube, polytope: Po
 
 
 def is_within(between: fmpq, small: fmpq, large: fmpq) -> bool:
-    """Whether a circle is in another, by the squares of the distance of the centres and of the radii: d + r <= R."""
+    """Whether a circle is in another: d + r <= R, from the squares of the distance of the centres and of the radii."""
     # This is d² + r² - R² <= -2 d r. The right side is not positive, so the left side must not be positive.
     excess = between + small - large
     return small <= large and excess <= 0 and excess * excess >= 4 * between * small

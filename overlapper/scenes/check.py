@@ -1,4 +1,4 @@
-"""A scene held against what was recorded of it: what the command line and pytest have in common."""
+"""The check of a scene against its expected file, shared by the command line and pytest."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from overlapper.verdicts.verdict import Verdict, examine, left_out
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The result of checking a scene. `lines` say more; `causes` has a word for each of geometry, shapes and dynamics.
+    """The result of checking a scene. `lines` say more. `causes` has a word each for geometry, shapes and dynamics.
 
-    "new": there was nothing recorded, now there is. "recorded": it was recorded because that was asked for.
+    "new": there was no expected file, and one was written. "recorded": the scene was recorded on request.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Outcome:
 
 
 def pages_of(scenes: Sequence[Path], folder: Path) -> dict[Path, Path]:
-    """The page of each scene file, in a folder: named by its stem, and by folders above it if others have that stem."""
+    """The page of each scene file in a folder. Its name is the stem, with parent folders if stems are equal."""
     parts = {scene: scene.resolve().with_suffix("").parts[1:] for scene in scenes}
     depth = dict.fromkeys(scenes, 1)
     while True:
@@ -52,10 +52,10 @@ def pages_of(scenes: Sequence[Path], folder: Path) -> dict[Path, Path]:
 
 
 def hold(path: Path, page: Path, anew: bool = False) -> Outcome:
-    """Run the scene of a file and compare it with its expected file, which is written if there is none, or `anew`.
+    """Run a scene and compare it with its expected file. The file is written if it is missing, or with `anew`.
 
-    If something has moved, `page` shows before and after. SceneError if the scene or its expected file is not to be
-    used, or if the scene has diverged and is to be recorded.
+    If something has moved, `page` shows before and after. SceneError if the scene or its expected file cannot be used,
+    or if the scene is to be recorded and has diverged.
     """
     scene = load_scene(path)
     try:
@@ -79,10 +79,10 @@ def hold(path: Path, page: Path, anew: bool = False) -> Outcome:
 
 
 def record(scene: Scene) -> list[str]:
-    """Run the scene and write its expected file anew; returns a sentence for all that is not modelled.
+    """Run the scene and write its expected file anew. Returns sentences on the shapes that are not modelled.
 
-    The steps, the tolerance and the budgets of an old file stay in force. A new file has four steps and budgets of five
-    times what rounding does to its measures when all is moved by less than a metre.
+    The steps, the tolerance and the budgets of an old file are kept. A new file has four steps. Its budgets are five
+    times the rounding errors of its measures when everything is moved by less than a metre.
     """
     try:
         made = _observed(scene, read_expected(scene.expected))
@@ -101,14 +101,14 @@ def _observed(scene: Scene, wanted: Expected) -> Expected:
 
 
 def examined(scene: Scene, expected: Expected) -> Verdict:
-    """Run the scene and compare it with what was recorded. SceneError if it fails."""
+    """Run the scene and compare it with the expected file. SceneError if the scene fails."""
     return examine(expected, stills(scene, expected.steps), scene.steps)
 
 
 def _page(verdict: Verdict, name: str, path: Path) -> tuple[Path | None, str]:
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # of meshcat's imports, and no business of the user's
+            warnings.simplefilter("ignore", DeprecationWarning)  # from meshcat's imports: the user cannot mend them
             from overlapper.verdicts import before_after
     except ImportError as error:
         return None, f"no page of before and after: {error}"

@@ -1,6 +1,6 @@
-"""Processes that a script starts and that load the library of a simulator: what they step is not noticed here.
+"""Processes that a script starts and that load the library of a simulator. Their steps are not noticed here.
 
-Linux tells which libraries a process has loaded. It is asked again and again, from the first process on.
+Linux tells which libraries a process has loaded. It is asked repeatedly after the first process has started.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-LOOK = 0.05  # s from one look to the next; to import the library takes longer
+LOOK = 0.05  # s between two looks; importing the library takes longer
 
-# Events of Python's audit hooks with which a process may be started; multiprocessing has none but its import.
+# Audit events of Python that may start a process. For multiprocessing, there is only the event of its import.
 STARTS = frozenset({"subprocess.Popen", "os.posix_spawn", "os.system", "os.spawn", "pty.spawn"})
 SPAWNING = frozenset({"multiprocessing.popen_spawn_posix", "multiprocessing.popen_forkserver"})
 
 
 class OtherProcesses:
-    """Notes which processes that this one starts from now on load `library`.
+    """Notes the processes that this process starts from now on and that load `library`.
 
-    A process that is forked off and goes on as this one is not among them. Nothing is noted but on Linux.
+    Forked processes that run the same program are not noted. Nothing is noted on systems other than Linux.
     """
 
     def __init__(self, library: str) -> None:
@@ -46,15 +46,15 @@ class OtherProcesses:
         own = Path(f"/proc/{self._process}/cmdline").read_bytes()
         while True:
             for process in descendants(self._process):
-                with suppress(OSError):  # it has ended
-                    # The command first: between fork and exec, a process has the libraries of this one.
+                with suppress(OSError):  # the process has ended
+                    # The command is read first: between fork and exec, a process has the libraries of this one.
                     if (process / "cmdline").read_bytes() != own and self._library in (process / "maps").read_bytes():
                         self.found.add(int(process.name))
             time.sleep(LOOK)
 
 
 def descendants(process: int) -> Iterator[Path]:
-    """The folder in /proc of each process that a process has started, and of those that these have started."""
+    """The folder in /proc of each descendant of a process."""
     for children in Path(f"/proc/{process}/task").glob("*/children"):
         with suppress(OSError):
             for child in children.read_text().split():

@@ -1,6 +1,6 @@
-"""The parameters of a scene: what `build(client, *, mass=1.0, seed=0)` may be told beside the client.
+"""The parameters of a scene: the arguments of `build(client, *, mass=1.0, seed=0)` other than the client.
 
-A parameter has a default that is a number, a text or True or False, and takes values of that kind.
+The default of a parameter is a number, a text, True or False. Its values are of the same kind.
 """
 
 from __future__ import annotations
@@ -38,25 +38,25 @@ READERS: dict[type, tuple[str, Callable[[str], Parameter]]] = {
     float: ("a finite number", _finite),
 }
 
-# Before the name of a parameter in the heading of a table: "set mass: 2.0".
+# The prefix of parameter names in the heading of a table: "set mass: 2.0".
 HEADING = "set "
 
 
 def parameters_of(build: Callable[..., Any], filled: bool = True) -> dict[str, Parameter]:
-    """The defaults of what `build` takes, by name; of none but numbers, texts, True and False.
+    """The parameters of `build` by name, with their defaults, if these are numbers, texts, True or False.
 
-    With `filled`, the first argument is what it fills, and no parameter.
+    With `filled`, the first argument is the simulation to be filled, and not a parameter.
     """
     try:
         taken = [*inspect.signature(build).parameters.values()][int(filled) :]
-    except (TypeError, ValueError):  # which C functions may raise
+    except (TypeError, ValueError):  # C functions may raise these
         return {}
     named = [each for each in taken if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]
     return {each.name: each.default for each in named if type(each.default) in (bool, int, float, str)}
 
 
 def known(name: str, defaults: Mapping[str, Parameter], scene: str) -> None:
-    """ValueError if the scene has no parameter of that name."""
+    """Raises ValueError if the scene has no parameter with this name."""
     if name in defaults:
         return
     if not defaults:
@@ -67,7 +67,7 @@ def known(name: str, defaults: Mapping[str, Parameter], scene: str) -> None:
 
 
 def value_of(name: str, text: str, default: Parameter) -> Parameter:
-    """The value that a text is for a parameter with that default. ValueError if it is none of its kind."""
+    """The value in a text, for a parameter with this default. ValueError if the text is not of the default's kind."""
     if isinstance(default, str):
         if (readable := encodable(text)) != text:
             raise ValueError(f"{name} must be text in UTF-8, not '{readable}'")
@@ -80,14 +80,14 @@ def value_of(name: str, text: str, default: Parameter) -> Parameter:
 
 
 def values_of(given: Mapping[str, str], defaults: Mapping[str, Parameter], scene: str) -> dict[str, Parameter]:
-    """All parameters: those given as text, and the defaults of the rest. ValueError names an invalid one."""
+    """All parameters: those given as text, and defaults for the rest. ValueError names an invalid parameter."""
     for name in given:
         known(name, defaults, scene)
     return {**defaults, **{name: value_of(name, text, defaults[name]) for name, text in given.items()}}
 
 
 def described(parameters: Mapping[str, Parameter]) -> str:
-    """As text, "mass=2.0, seed=7"."""
+    """The parameters as text, such as "mass=2.0, seed=7"."""
     return ", ".join(f"{name}={value}" for name, value in parameters.items())
 
 

@@ -1,7 +1,7 @@
-"""A scene, or the table of one, played back step by step.
+"""Playback of a scene, or of the table of a scene, step by step.
 
-An expected file has the shapes and poses of its steps, and is shown without the scene. Any other table has overlaps
-alone: its scene is run again with the table's settings, and held against the table.
+An expected file has the shapes and poses of its steps, and is shown without the scene. Any other table has only
+overlaps. Its scene is run again with the table's settings, and compared with the table.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from overlapper.tables.table_file import TABLES, read_content
 from overlapper.verdicts.comparison import compare_measures
 from overlapper.verdicts.expected import HUNDREDTHS, Expected, expected_in, has_shapes
 
-STEP = 1 / 240  # s, what pybullet takes for a step; an expected file says nothing of time
+STEP = 1 / 240  # s, pybullet's default time step; an expected file has no time
 
 View = Frame[AnyBodies] | Frame[Still]
 
 
 @dataclass
 class Playback:
-    """The frames to show: `views`, as many as `total`. After the last one, `remarks` has the closing remarks.
+    """The frames to show: `views`, `total` in number. After the last view, `remarks` has the closing remarks.
 
-    `sparse` views are few steps of many, each worth a look. `skipped` has what was left out of the views so far, with
-    the first step of each.
+    `sparse` views are a few selected steps. `skipped` has the shapes left out of the views so far, with the first step
+    of each.
     """
 
     name: str
@@ -65,11 +65,11 @@ def play(
     given: Mapping[str, str] | None = None,
     contact: ContactModel | None = None,
 ) -> Playback:
-    """The playback of a scene, by name or path, or of a table. For a scene, `steps`, the parameters `given` and
-    `contact` are by default as it says.
+    """The playback of a scene, by name or path, or of a table. By default, the scene sets `steps`, the parameters
+    `given` and `contact`.
 
-    A table without shapes is of the `scene` given: what a table names is not run, as tables come from anywhere. Nor is
-    a scene run for longer than it says, or than `steps`, because a table goes on.
+    A table without shapes needs the `scene`. The scene that a table names is not run, as tables may come from anywhere.
+    A scene is never run longer than its own number of steps, or `steps`, even if the table has more steps.
 
     SceneError if a scene cannot be found or run, ValueError or OSError if a table cannot be read.
     """
@@ -133,7 +133,7 @@ def _held_against(
 
 
 def largest(views: Iterator[View]) -> Frame[Still]:
-    """The view in which most is shared, kept apart from the simulation; the last one if nothing ever is."""
+    """A copy of the view with the largest shared volume; the last view if there is none."""
     best, most = None, -1.0
     for view in views:
         volume = sum(contact.overlap.volume for contact in view.contacts)

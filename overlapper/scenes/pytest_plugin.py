@@ -1,6 +1,6 @@
-"""`pytest scenes/` runs scenes and compares them with what was recorded of them: a test for each.
+"""`pytest scenes/` runs scenes and compares them with their expected files, one test per scene.
 
-Nothing of the package is imported before a file is found that may be a scene.
+The package is imported only when a file is found that may be a scene.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 class SceneFile(pytest.File):
-    """A scene, which is one test of the same name."""
+    """A scene file: one test with the same name."""
 
     def collect(self) -> Iterable[pytest.Item]:
         yield SceneItem.from_parent(self, name=self.path.stem)
 
 
 class SceneMoved(Exception):
-    """A scene is not as it was recorded, or was not recorded before."""
+    """A scene differs from its expected file, or had none."""
 
 
 class SceneItem(pytest.Item):
-    """The scene is run, and its geometry, its shapes and its dynamics are compared with those recorded."""
+    """The test runs the scene and compares its geometry, shapes and dynamics with the expected file."""
 
     def runtest(self) -> None:
         try:
@@ -74,7 +74,7 @@ class SceneItem(pytest.Item):
             raise SceneMoved("\n".join(lines + again * (outcome.word == "moved")))
 
     def _tell(self, outcome: Outcome) -> None:
-        """Keep the outcome for --junitxml and the end of the run, also for passed tests and from other processes."""
+        """Store the outcome for --junitxml and the end of the run, also if tests pass or run in other processes."""
         self.user_properties += outcome.causes.items()
         remarks = [f"note: {note}" for note in outcome.notes] + outcome.lines * (outcome.word == "recorded")
         self.user_properties += [(PROPERTY, f"{outcome.name}: {remark}") for remark in remarks]

@@ -1,4 +1,4 @@
-"""A scene run: built in a simulation of its own and stepped, frame by frame."""
+"""Runs of scenes: a scene is built in a new simulation and stepped, frame by frame."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def run(
     contact: ContactModel | None = None,
     only: Container[int] | None = None,
 ) -> Generator[Frame[AnyBodies], None, None]:
-    """Build the scene in a simulation of its own and step it, `scene.steps` times by default.
+    """Build the scene in a new simulation and step it, `scene.steps` times by default.
 
-    Every step is a frame, and the first frame has number 1. With `only`, the steps in it alone are frames. `contact` is
-    what pushes bodies apart: the scene's engine by its name, or "volumetric", a `VolumetricContact` of the pairs that
-    the simulator lets collide. By default the scene says which, and which pairs are asked for. SceneError if the scene
-    fails or cannot be measured, ValueError if `contact` is invalid.
+    Every step is a frame, and the first frame has number 1. With `only`, only the steps in it are frames. `contact`
+    chooses the contact forces: the name of the scene's engine, or "volumetric" for a `VolumetricContact` of the pairs
+    that the simulator lets collide. By default the scene chooses `contact`, and also the pairs that are measured.
+    SceneError if the scene fails or cannot be measured, ValueError if `contact` is invalid.
     """
     model = scene.contact if contact is None else contact
     if model not in (scene.engine, "volumetric"):
@@ -96,6 +96,6 @@ def _controlled(scene: Scene, step: Step | None, i: int) -> None:
 
 
 def stills(scene: Scene, steps: Sequence[int]) -> dict[int, Still]:
-    """Some steps of the scene as it is today, with the shapes as a file would have them."""
+    """Some steps of the present scene, with the shapes as they are read back from a file."""
     last = min(max(steps), scene.steps)
     return {frame.step: Still.of(frame.bodies, frame.forces).as_written() for frame in run(scene, last, only=steps)}

@@ -1,14 +1,17 @@
-"""Scenes: what they are, and how they are found by name or by path.
+"""Scenes, and how they are found by name or by path.
 
 A scene is a Python file with a docstring that says what is hard about it, `STEPS`, and `build(client)`. `build` fills
-the pybullet client and may return `step(i)`, which is called before every stepSimulation. What `build` takes beside the
-client, `build(client, *, mass=1.0, seed=0)`, are the scene's parameters. `PAIRS`, if it is there, says which pairs are
-looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
-apart. `CONTACT`, if it is there, says what pushes them: the name of the engine, as by default, or "volumetric", for
-`simulation.VolumetricContact`. It may be a dictionary of the arguments of that, too, as {"stiffness": 1e8}. `NAMES`, a
-dictionary that `build` fills, has names of bodies by their numbers, as `simulation.Bodies` takes them. `ENGINE`, if it
-is there, names the simulator, "bullet" by default. With "mujoco", `build(*, mass=1.0)` returns (model, data) or
-(model, data, step). An MJCF file, .xml, is a scene as it is: a second of its model.
+the pybullet client and may return `step(i)`, which is called before every stepSimulation. The other arguments of
+`build`, as in `build(client, *, mass=1.0, seed=0)`, are the scene's parameters. A scene may have four more names:
+
+- `PAIRS` chooses the pairs, as in `simulation.Bodies.pairs`: "all" if a filter stops overlapping bodies from colliding.
+- `CONTACT` chooses the contact forces: the name of the engine (the default), "volumetric" for
+  `simulation.VolumetricContact`, or a dictionary of arguments of `VolumetricContact`, such as {"stiffness": 1e8}.
+- `NAMES` is a dictionary that `build` fills with names of bodies by their numbers, as in `simulation.Bodies`.
+- `ENGINE` names the simulator, "bullet" by default. With "mujoco", `build(*, mass=1.0)` returns (model, data) or
+  (model, data, step).
+
+An MJCF file, .xml, is a scene, too: one second of its model.
 """
 
 from __future__ import annotations
@@ -31,21 +34,21 @@ from overlapper.simulation.engine import ENGINES, FILES, RETURNED
 
 Step = Callable[[int], object]
 ContactModel = Literal["bullet", "mujoco", "volumetric"]
-"""The forces that push bodies apart: those of the scene's own engine, or of the volumes that they share."""
+"""The forces that push bodies apart: those of the scene's engine, or of volumetric contact."""
 
 # The arguments that a scene may give simulation.VolumetricContact.
 TOLD = frozenset({"stiffness", "dissipation", "friction", "substeps"})
 
 
 class SceneError(Exception):
-    """A scene that cannot be found, loaded or run; the message is one sentence for whoever can mend it."""
+    """A scene cannot be found, loaded or run. The message is one sentence for the author of the scene."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A simulation that can be built again and again, and how many steps of it are worth looking at.
+    """A simulation that can be built repeatedly, with its number of steps.
 
-    `parameters` are what `build` is given beside the client, `volumetric` what `VolumetricContact` is told, by name.
+    `parameters` are the arguments of `build` other than the client. `volumetric` are arguments of `VolumetricContact`.
     """
 
     name: str
@@ -62,7 +65,7 @@ class Scene:
 
     @property
     def expected(self) -> Path:
-        """Where its expected file is or would be."""
+        """The path of its expected file, which may not exist yet."""
         return self.path.parent / "expected" / f"{self.name}.csv"
 
     @property
@@ -72,7 +75,7 @@ class Scene:
 
 
 def scene_paths() -> dict[str, Path]:
-    """The scenes that can be run by name: those of the folder `scenes` here, then those of the checkout."""
+    """The scenes that can be run by name: of the checkout, and of the folder `scenes` here, which has precedence."""
     checkout = Path(__file__).parents[2]
     folders = [checkout / "scenes"] if (checkout / "pyproject.toml").is_file() else []
     paths = {path.stem: path for folder in [*folders, Path("scenes")] for path in folder.glob("[!_]*.py")}
@@ -80,12 +83,12 @@ def scene_paths() -> dict[str, Path]:
 
 
 def is_scene(path: Path) -> bool:
-    """True for a Python file with a docstring, STEPS and build(client), or build() and ENGINE; it is read, not run.
+    """True for a Python file with a docstring, STEPS and build(client), or build() and ENGINE. The file is not run.
 
-    A file with the last two that is not Python at all counts as one, so that it is refused and not overlooked.
+    A file with STEPS and build that is not valid Python counts as a scene, so that it is refused and not overlooked.
     """
     source = path.read_bytes()
-    # Most files are no scenes, and are not worth parsing.
+    # Most files are not scenes, and need not be parsed.
     patterns = rb"^STEPS\b", rb"^def build\(\s*client\b|^ENGINE\b"
     if not all(re.search(pattern, source, re.MULTILINE) for pattern in patterns):
         return False
@@ -93,7 +96,7 @@ def is_scene(path: Path) -> bool:
         module = ast.parse(source)
     except (SyntaxError, ValueError):
         return True
-    # The lines found may be those of a string.
+    # The lines that were found may be within a string.
     names = {node.name for node in module.body if isinstance(node, ast.FunctionDef)}
     for node in module.body:
         targets = getattr(node, "targets", [getattr(node, "target", None)])
@@ -102,7 +105,7 @@ def is_scene(path: Path) -> bool:
 
 
 def scenes_in(path: Path) -> list[Path]:
-    """The scene files in a folder and the folders in it, by name; or the one file. SceneError if there is none."""
+    """The scene files in a folder and its subfolders, sorted by path; or the one file. SceneError if there is none."""
     paths = [path] if path.is_file() else sorted(filter(is_scene, path.rglob("*.py")))
     if not paths:
         raise SceneError(f"there is no scene in {path}" if path.is_dir() else f"there is no scene file {path}")
@@ -110,7 +113,7 @@ def scenes_in(path: Path) -> list[Path]:
 
 
 def headline(path: Path) -> str:
-    """The first line of a scene's docstring; the scene is not run."""
+    """The first line of a scene's docstring. The scene is not run."""
     try:
         docstring = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
     except SyntaxError:
@@ -119,9 +122,9 @@ def headline(path: Path) -> str:
 
 
 def load_scene(name_or_path: str | Path, given: Mapping[str, str] | None = None) -> Scene:
-    """The scene of that name, or of that file (a path ends in .py), with the parameters `given`, as text.
+    """The scene with this name, or of this file (a path ends in .py), with the parameters `given` as text.
 
-    SceneError says what is wrong with it, or with a parameter.
+    SceneError says what is wrong with the scene or with a parameter.
     """
     path = find_scene(name_or_path)
     scene = scene_of(path, path.read_bytes())
@@ -132,10 +135,10 @@ def load_scene(name_or_path: str | Path, given: Mapping[str, str] | None = None)
 
 
 def scene_of(path: Path, source: bytes) -> Scene:
-    """The scene that the text of a file is. SceneError says what is wrong with it."""
+    """The scene of a file with this text. SceneError says what is wrong with it."""
     if path.suffix in FILES:
         return _scene_of_model(path)
-    if not re.search(rb"\bSTEPS\b|\bimport \*", source):  # not run: a script may do anything, for ever
+    if not re.search(rb"\bSTEPS\b|\bimport \*", source):  # not run: a script may do anything, or never end
         raise SceneError(f"{path} is no scene, as it has no STEPS: overlapper watch {path} runs a script as it is")
     module = _imported(path, source)
     steps, build = getattr(module, "STEPS", None), getattr(module, "build", None)
@@ -165,7 +168,7 @@ def scene_of(path: Path, source: bytes) -> Scene:
 
 
 def _scene_of_model(path: Path) -> Scene:
-    """The scene that a file of a model is: a second of it. SceneError if it does not compile or nobody can read it."""
+    """The scene of a model file: one second of it. SceneError if the file does not compile or its engine is missing."""
     named: Any = FILES[path.suffix]
     try:
         reader: Any = import_module(ENGINES[named])
@@ -177,7 +180,7 @@ def _scene_of_model(path: Path) -> Scene:
 
 
 def engine_in(path: Path, source: bytes) -> str:
-    """The engine of a scene file, by its ending or by the ENGINE that its text names; the text is not run."""
+    """The engine of a scene file, by its ending or by ENGINE in its text. The text is not run."""
     if path.suffix in FILES:
         return FILES[path.suffix]
     found = re.search(rb"^ENGINE\s*=\s*[\"'](\w+)[\"']", source, re.MULTILINE)
@@ -185,7 +188,7 @@ def engine_in(path: Path, source: bytes) -> str:
 
 
 def find_scene(name_or_path: str | Path) -> Path:
-    """The file of the scene of that name, or that file. SceneError if there is none."""
+    """The file of the scene with this name, or the file with this path. SceneError if there is none."""
     path = Path(name_or_path)
     if path.suffix in (".py", *FILES):
         if not path.is_file():
@@ -204,7 +207,7 @@ def _imported(path: Path, source: bytes) -> ModuleType:
     module = ModuleType(path.stem)
     module.__file__ = str(path)
     try:
-        # Bytecode on disk is taken for that of a source of the same size that was written in the same second.
+        # No cached bytecode: Python would reuse it for another source of the same size written in the same second.
         exec(_compiled(path, source), module.__dict__)
     except Exception as error:
         raise broken(path, "cannot be loaded", error) from error
@@ -213,12 +216,12 @@ def _imported(path: Path, source: bytes) -> ModuleType:
 
 @lru_cache(maxsize=1)
 def _compiled(path: Path, source: bytes) -> CodeType:
-    """The code of a scene, kept for its next run: a sweep has thousands."""
+    """The code of a scene, cached for its next run: a sweep has thousands of runs."""
     return compile(source, path, "exec")
 
 
 def broken(path: Path, what: str, error: Exception) -> SceneError:
-    """The SceneError for an `error` that the scene file raised, with the line of the file where it came from."""
+    """The SceneError for an `error` that the scene file raised, with the line of the file that raised it."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if Path(frame.filename).resolve() == path.resolve()]
     reason: object = error

@@ -1,4 +1,4 @@
-"""A Python script run as Python itself runs it, by somebody who wants to do something before it ends."""
+"""Run a Python script as Python does, and let the caller do something before the process ends."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pathlib import Path
 from types import ModuleType, TracebackType
 
 STANDS_IN = "__stands_in__"
-"""A global name of modules whose functions stand in for those of a simulator, in order to be heard."""
+"""A global name of modules whose functions replace those of a simulator, to report their calls."""
 
 
 def run_script(path: Path, arguments: Sequence[str]) -> BaseException | None:
-    """Run the script as __main__, and wait for its threads; returns what ended it, if it was no return.
+    """Run the script as __main__, and wait for its threads. Returns the exception that ended it, if any.
 
-    The traceback of an exception has been shown then, without anything of this package; `end_as` does the rest. OSError
-    if the file cannot be read.
+    The traceback of the exception has been shown, without frames of this package; `end_as` does the rest. OSError if
+    the file cannot be read.
     """
     place = path.absolute()
     source = path.read_bytes()
@@ -30,7 +30,7 @@ def run_script(path: Path, arguments: Sequence[str]) -> BaseException | None:
         __annotations__={},
         __cached__=None,
     )
-    # Whatever is still held of the one that was there stays alive as long as it would have.
+    # Keep the former __main__ alive, as code may still hold objects of it.
     sys.modules["__main__"], main.__dict__["__overlapper__"] = main, sys.modules["__main__"]
     sys.argv[:] = [str(path), *arguments]
     sys.path[0] = str(place.resolve().parent)
@@ -55,7 +55,7 @@ def _wait_for_threads() -> None:
 
 
 def _of_script(trace: TracebackType | None, place: str) -> TracebackType | None:
-    """The part from the script's first line to the call of a simulator, if there is one that is heard."""
+    """The part of a traceback from the script's first line to a replaced function of a simulator, if there is one."""
     entries: list[TracebackType] = []
     while trace:
         if entries and STANDS_IN in trace.tb_frame.f_globals:
@@ -70,9 +70,9 @@ def _of_script(trace: TracebackType | None, place: str) -> TracebackType | None:
 
 
 def end_as(ended: BaseException | None) -> None:
-    """Let Python end the process as it would have ended it after the script: exit code, signal, last words."""
+    """Let Python end the process as it would after the script: with the same exit code, signal and messages."""
     if ended is None:
         return
     if not isinstance(ended, SystemExit):
-        sys.excepthook = lambda *_: None  # it has been shown
+        sys.excepthook = lambda *_: None  # the traceback has been shown
     raise ended

@@ -1,4 +1,4 @@
-"""Simulations that somebody else steps, noticed and measured."""
+"""Simulations that are stepped by other code, noticed and measured."""
 
 from __future__ import annotations
 
@@ -33,29 +33,29 @@ if TYPE_CHECKING:
 
 
 class Watch:
-    """Measures a simulation whenever it has been stepped, by whomever, as `overlapper run` does with scenes.
+    """Measures a simulation after each step by any code, as `overlapper run` does with scenes.
 
         with overlapper.watch(client, "run.parquet", "run.html") as watch:
             ...  # any code that calls pybullet.stepSimulation()
         watch.summary.as_dict()
 
-    `out` is the table (.csv, .parquet, .sqlite), `html` the page to look at in a browser. Both grow beside their places
-    and take them at the end of the `with`, by `close()`, or when the client disconnects. After an error they stay
-    beside their places, as `written` then says. `every` is the number of steps from one that is measured to the next,
-    `per` what the rows of the table are of, and check="fcl" asks FCL, too. `surface`, `concave`, `concave_threshold`
-    and `names` are those of `simulation.Bodies`, and `pairs`, `tolerance` and `method` those of `Bodies.overlaps`. What
-    pybullet cannot be asked for (pair filters, the filter mode, self-collision, height fields, files) is known if it
-    was said after the watch began, or to `recorder`.
+    `out` is the table (.csv, .parquet, .sqlite), and `html` is the page for a browser. Both are written to files beside
+    these paths. The files take their places at the end of the `with`, by `close()`, or when the client disconnects.
+    After an error they stay beside these paths, and `written` names them. One of `every` steps is measured. `per`
+    chooses the rows of the table, and check="fcl" asks FCL, too. `surface`, `concave`, `concave_threshold` and `names`
+    are those of `simulation.Bodies`, and `pairs`, `tolerance` and `method` are those of `Bodies.overlaps`. pybullet
+    cannot be asked for pair filters, the filter mode, self-collision, height fields and files. They are known if they
+    were set after the watch began, or if `recorder` has noted them.
 
     `physicsClientId` is the number of a pybullet client or a `mujoco.MjData`. `engine` names the simulator, as ENGINE
-    of a scene does, where the kind of simulation does not tell.
+    of a scene does, if the kind of simulation does not tell it.
 
-    Steps are noticed of `pybullet.stepSimulation` and `mujoco.mj_step`, not of a name that was imported from these
-    before, and not in other processes; a simulation in real time is not stepped by calls. What cannot be measured or
-    written raises in the call that made the step, and the watch is over.
+    The watch notices calls of `pybullet.stepSimulation` and `mujoco.mj_step`. It does not notice calls by a name that
+    was imported from these modules earlier, steps in other processes, and steps in real time. If a step cannot be
+    measured or written, the call that made the step raises the error, and the watch ends.
 
-    ValueError for a client that is not connected or an invalid option, OSError if a file cannot be written,
-    ImportError without the library that does it.
+    ValueError for a client that is not connected or an invalid option. OSError if a file cannot be written. ImportError
+    if the library that writes it is missing.
     """
 
     def __init__(
@@ -92,12 +92,12 @@ class Watch:
         can_be_written(self.out, self.html)
         self.every, self._per = every, per
         self.steps, self.time = 0, 0.0
-        """Steps since the watch began, measured or not, and the seconds that they took in the simulation."""
+        """Number of steps since the watch began, measured or not, and their simulated time, s."""
         self.measured = 0
         """The number of steps that were measured."""
         self.summary = Summary(name)
         self.written: list[Path] = []
-        """The files that there are, once the watch is over."""
+        """The files that were written, known when the watch is over."""
         self.open = True
         self._names = names
         self._fcl = Fcl() if check else None
@@ -105,13 +105,13 @@ class Watch:
         self._bodies: AnyBodies | None = None
         self._files = ExitStack()
         self._take: Callable[[Frame[AnyBodies]], None] | None = None
-        self._rhythm = 0, 0.0, 0.0  # steps and time since which a step takes so many seconds
+        self._rhythm = 0, 0.0, 0.0  # steps and time at the last change of the time step, and the time step
         self._lock = threading.RLock()
         self._process = os.getpid()
         self._unlisten = of_engine.listen(self._hear)
 
     def _hear(self, happening: Happening, which: Hashable) -> None:
-        # A process that was forked off has simulations of its own, and no business in our files.
+        # A forked process has its own simulations and must not write our files.
         if which != self.physicsClientId or os.getpid() != self._process:
             return
         if happening == "stepped":
@@ -131,7 +131,7 @@ class Watch:
         try:
             self._measure()
         except KeyboardInterrupt:
-            self._bodies = None  # which may have been interrupted in the middle of anything
+            self._bodies = None  # it may have been interrupted in any state
             raise
         except Exception:
             self.leave()
@@ -139,7 +139,7 @@ class Watch:
 
     def _measure(self) -> None:
         if self._bodies is None:
-            # The summary names what is left out, and `unnamed` the names of no body.
+            # The summary names the skipped shapes, and `unnamed` the names without a body.
             for kind in (SkippedShapeWarning, UnknownBodyWarning):
                 warnings.filterwarnings("ignore", category=kind, module=rf"{__name__}$")
             self._bodies = self._simulation.bodies(**settings_of(self._modelling), names=self._names)
@@ -153,7 +153,7 @@ class Watch:
             self.measured += 1
 
     def _begun(self, bodies: AnyBodies) -> Callable[[Frame[AnyBodies]], None]:
-        """The function that takes the frames; the files are there from now on."""
+        """The function that takes the frames. It creates the files."""
         watched = {"simulation": self.summary.scene, "every": self.every}
         settings = origin(bodies.engine) | watched | settings_of(self._asking) | bodies.settings
         files = outputs(self.summary, settings, self.written, self.out, self.html, self._per, self._fcl)
@@ -166,12 +166,12 @@ class Watch:
         return {body: name for body, name in (self._names or {}).items() if body not in there}
 
     def close(self) -> None:
-        """End the watch: files are put in their places. OSError if one cannot be."""
+        """End the watch and put the files in their places. OSError if this fails."""
         self._end()
         self._files.close()
 
     def leave(self) -> None:
-        """End the watch because something failed: files stay beside their places, as `written` says."""
+        """End the watch after a failure. Files stay beside their places, and `written` names them."""
         self._end()
         self._files.__exit__(RuntimeError, RuntimeError(), None)
 
@@ -197,22 +197,22 @@ class Watch:
 
 
 class Watches:
-    """Watches all simulations of this process from their beginning on; each that is measured has files of its own.
+    """Watches all simulations of this process from their beginning. Each measured simulation has its own files.
 
-    The first has `out` and `html`, the second `out-2` and so on. What cannot be measured or written ends the watch of
-    that simulation, and goes to `failed`, not to the code that makes steps.
+    The first simulation has the files `out` and `html`, the second has `out-2`, and so on. A failure to measure or
+    write ends the watch of that simulation. The error goes to `failed`, not to the code that makes steps.
     """
 
     def __init__(self, name: str, out: Path | None, html: Path | None, how: Mapping[str, Any]) -> None:
         self._name, self._out, self._html, self._how = name, out, html, how
         self.all: list[Watch] = []
-        """Those that have measured something, in the order in which they began to."""
+        """The watches that have measured something, in the order of their first measurements."""
         self.failed: list[tuple[Watch, Exception]] = []
         self.steps = 0
-        """The steps of all simulations, measured or not."""
+        """The number of steps of all simulations, measured or not."""
         self.in_real_time = False
-        """Whether a simulation was let run by the clock."""
-        self._elsewhere = mmap(-1, 1)  # which forked processes write to
+        """Whether a simulation was run in real time."""
+        self._elsewhere = mmap(-1, 1)  # shared memory that forked processes write to
         self._others = OtherProcesses(LIBRARIES["bullet"])
         self._of: dict[Hashable, Watch] = {}
         self._process = os.getpid()
@@ -238,12 +238,12 @@ class Watches:
 
     @property
     def stepped_elsewhere(self) -> bool:
-        """Whether a process that was forked off has made steps, which are not watched."""
+        """Whether a forked process has made steps, which are not watched."""
         return bool(self._elsewhere[0])
 
     @property
     def loaded_elsewhere(self) -> int:
-        """How many processes were started that have loaded the simulator; what they may have stepped is not watched."""
+        """The number of started processes that have loaded the simulator. Their steps are not watched."""
         return len(self._others.found)
 
     @property
@@ -254,7 +254,7 @@ class Watches:
         return bool(self.all and not left_out)
 
     def _number(self, watch: Watch) -> None:
-        """Give a watch its files, as it is about to measure."""
+        """Assign files to a watch before its first measurement."""
         self.all.append(watch)
         number = len(self.all)
         if number > 1:
@@ -265,7 +265,7 @@ class Watches:
         )
 
     def end(self, failed: bool) -> None:
-        """End all watches; their files stay beside their places if what was watched has `failed`."""
+        """End all watches. Their files stay beside their places if the watched script has `failed`."""
         if os.getpid() != self._process:
             return
         for unlisten in self._unlisten:
@@ -276,7 +276,7 @@ class Watches:
 
 
 class _Kept(Watch):
-    """A watch that keeps its failures from the code that makes the steps."""
+    """A watch that does not raise its failures in the code that makes the steps."""
 
     def __init__(
         self, client: Any, number: Callable[[Watch], None], failed: list[tuple[Watch, Exception]], **how: Any
@@ -303,7 +303,7 @@ class _Kept(Watch):
 
 @contextmanager
 def interrupted_later() -> Iterator[None]:
-    """Ctrl-C waits for the end of the block, so that what is written is written whole."""
+    """Delay Ctrl-C until the end of the block, so that writing is not interrupted."""
     handler = signal.getsignal(signal.SIGINT)
     if not callable(handler) or threading.current_thread() is not threading.main_thread():
         yield

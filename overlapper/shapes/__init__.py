@@ -1,4 +1,4 @@
-"""The kinds of shapes: each has a file that answers the questions of `facts.Facts`."""
+"""The kinds of shapes. Each kind has a file that implements the protocol `facts.Facts`."""
 
 from overlapper._core import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Sphere
 

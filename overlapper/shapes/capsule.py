@@ -54,7 +54,7 @@ class CapsuleFacts(Round):
 
     def holds(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
         x, y, z = points.T
-        # Twice the length past its ends, by the denominator of the length: so that it is an integer.
+        # Twice the length beyond the ends, times the denominator of the length, so that it is an integer.
         length = Fraction(self.shape.length)
         past = np.maximum(2 * length.denominator * abs(z) - length.numerator * scale, 0)
         own = (2 * length.denominator) ** 2
@@ -69,7 +69,7 @@ class CapsuleFacts(Round):
         return normal
 
     def exits(self, start: Exact, arms: Exact, scale: int, fine: int) -> Exact:
-        """Through the side where that is met between the ends, else through the cap that lies ahead."""
+        """Rays leave through the side if they meet it between the ends, else through the cap ahead."""
         (radius, half), grow = in_units(scale, self.shape.radius, self.shape.length / 2)
         arms, starts = grow * arms, np.repeat(grow * start[None], len(arms), axis=0)
         shares, past = np.zeros(len(arms), object), arms[:, 2] << fine

@@ -1,4 +1,4 @@
-"""Answers that several kinds of shapes share. A kind inherits what is true of it; `Facts` has the questions."""
+"""Methods of `Facts` that several kinds of shapes share. A kind of shape inherits the classes that apply to it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from overlapper.shapes.planes import Planes
 
 
 class Flat(ABC):
-    """A shape that is what lies below its planes."""
+    """A shape that is the intersection of the half-spaces below its planes."""
 
     isotropic = False
     has_blocks = True
@@ -37,7 +37,7 @@ class Flat(ABC):
 
 
 class Round:
-    """A bounded shape with a curved side, which nothing stands on."""
+    """A bounded shape with a curved side. `side` does not report its flat sides, if it has any."""
 
     bounded = True
     planes = None

@@ -1,4 +1,4 @@
-"""Triangles and lines to draw surfaces by."""
+"""Triangles and lines for drawing surfaces."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-SMOOTH = np.cos(np.deg2rad(40))  # of the angle between two facets: more is an edge to be seen
+SMOOTH = np.cos(np.deg2rad(40))  # of the angle between two facets: at larger angles, their edge is drawn
 Facets = Sequence[NDArray[np.integer[Any]]] | NDArray[np.integer[Any]]
 
 
@@ -18,9 +18,9 @@ Facets = Sequence[NDArray[np.integer[Any]]] | NDArray[np.integer[Any]]
 class Tessellation:
     """Triangles `faces` (k, 3), counter-clockwise from outside, over `vertices` (n, 3).
 
-    `normals` (n, 3) are the directions to shade by, None if the triangles are meant flat. `edges` (m, 2, 3) are lines
-    that show the shape beside its faces: creases, rims, a grid. `wires` (w, 2, 3) are lines that show it without them:
-    every edge, or circles and meridians of what is round.
+    `normals` (n, 3) are the normals for shading, None for flat triangles. `edges` (m, 2, 3) are lines to draw together
+    with the faces: creases, rims, a grid. `wires` (w, 2, 3) are lines to draw without the faces: every edge, or circles
+    and meridians of round shapes.
     """
 
     vertices: Array
@@ -31,20 +31,20 @@ class Tessellation:
 
 
 def polyhedron(vertices: Array, facets: Facets) -> Tessellation:
-    """A surface of convex facets, which are rings of indices, counter-clockwise from outside."""
+    """A surface of convex facets. The facets are rings of indices, counter-clockwise from outside."""
     edges = vertices[polytope_edges(facets)]
     return Tessellation(vertices, triangles(facets), None, _creases(vertices, facets), edges)
 
 
 def side_of_polyhedron(vertices: Array, facets: Facets, towards: Array) -> tuple[Array, float, Array]:
-    """Unit normal, offset and corners (k, 3) of the facet whose plane a point is farthest above."""
+    """Unit normal, offset and corners (k, 3) of the facet above whose plane the point `towards` is highest."""
     planes = [_plane(vertices[ring]) for ring in facets]
     nearest = int(np.argmax([towards @ normal - offset for normal, offset in planes]))
     return *planes[nearest], vertices[facets[nearest]]
 
 
 def _plane(corners: Array) -> tuple[Array, float]:
-    """The unit normal of a facet, counter-clockwise from outside, and how far it is from the origin."""
+    """The unit normal of a facet, counter-clockwise from outside, and the offset of its plane from the origin."""
     normal = np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
     normal /= np.linalg.norm(normal)
     return normal, float(corners.mean(axis=0) @ normal)
@@ -60,9 +60,9 @@ def capped(radius: float, half: float) -> Tessellation:
 def revolved(
     radii: Array, heights: Array, slopes: Array, rims: Sequence[int] = (), circles: Sequence[int] = ()
 ) -> Tessellation:
-    """A profile turned about z: radii, heights, and the angles of its normals above the horizon.
+    """A profile rotated about z: radii, heights, and the angles of its normals above the xy plane.
 
-    The points numbered in `rims` make edges, and those in `circles` make wires, which meridians join.
+    The points with numbers in `rims` make edges. The points with numbers in `circles` make wires, joined by meridians.
     """
     turn = np.linspace(0, 2 * np.pi, 49)
     outward, up = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1), np.array([0.0, 0.0, 1.0])
@@ -77,12 +77,12 @@ def revolved(
 
 
 def polylines(points: Array) -> Array:
-    """Lines (k, n, 3) through n points each, as segments (k (n - 1), 2, 3)."""
+    """Polylines (k, n, 3) through n points each, as segments (k (n - 1), 2, 3)."""
     return np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 
 def triangles(facets: Facets) -> NDArray[np.integer[Any]]:
-    """Convex facets, rings of indices, cut into len(ring) - 2 triangles each: (k, 3), in the order of the facets."""
+    """Triangles (k, 3) of convex facets, len(ring) - 2 for each ring of indices, in the order of the facets."""
     if isinstance(facets, np.ndarray) and facets.shape[1:] == (3,):
         return facets
     return np.array([(ring[0], ring[i], ring[i + 1]) for ring in facets for i in range(1, len(ring) - 1)])

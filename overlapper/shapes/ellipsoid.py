@@ -41,7 +41,7 @@ class EllipsoidFacts(Round):
         return "ellipsoid", f"half axes {times(self.shape.half_axes)}", 0
 
     def tessellation(self) -> Tessellation:
-        """The image of a ball of radius 1; the normals are those of the ellipsoid."""
+        """The image of the tessellation of a ball of radius 1, with the normals of the ellipsoid."""
         half_axes, ball = self.shape.half_axes, capped(1.0, 0.0)
         assert ball.normals is not None
         normals = ball.normals / half_axes
@@ -63,7 +63,7 @@ class EllipsoidFacts(Round):
         return Fraction(0), Fraction(stretched @ stretched) / scale**2
 
     def holds(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
-        """A ball is held if it is in the ellipsoid that is smaller by its share of the shortest half axis."""
+        """A ball is inside if its centre is in the ellipsoid shrunk by radius / shortest half axis."""
         inverse, unit = integers(1 / self.half_axes)
         room = (1 - margin / min(self.half_axes)) * scale * unit
         square = ((points * inverse) ** 2).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Where rays leave balls, cylinders and planes: in integers, rounded towards the inside."""
+"""The points at which rays leave balls, cylinders and planes, in integers, rounded towards the inside."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from overlapper.rational import Exact, exact, integer_root, integers
 
 
 def in_units(scale: int, *sizes: float) -> tuple[list[int], int]:
-    """Sizes in units so small that they are integers, and how many of the units make one of 1 / scale."""
+    """Sizes as integers in a small enough unit, and the number of these units in 1 / scale."""
     numbers, grow = integers(exact([*sizes]))
     return [int(x) * scale for x in numbers], grow
 
@@ -16,7 +16,7 @@ def in_units(scale: int, *sizes: float) -> tuple[list[int], int]:
 def out_of_ball(start: Exact, arms: Exact, radius: int, fine: int) -> Exact:
     """The greater share at which |start + share * arm| is the radius, in two or three dimensions.
 
-    Of the two usual forms this takes the one that does not cancel.
+    Of the two usual formulas for the root, the formula without cancellation is used.
     """
     inside = radius * radius - (start * start).sum(axis=1)
     along, square = (start * arms).sum(axis=1), (arms * arms).sum(axis=1)
@@ -28,5 +28,5 @@ def out_of_ball(start: Exact, arms: Exact, radius: int, fine: int) -> Exact:
 
 
 def share_to_plane(slack: int, along: int, fine: int) -> int:
-    """The share of a ray at which it meets a plane that is `slack` away; 1 if the ray does not get nearer."""
+    """The share of a ray at which it meets a plane at distance `slack`; 1 if the ray does not approach the plane."""
     return (slack << fine) // along if along > 0 else 1 << fine

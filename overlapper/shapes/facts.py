@@ -1,4 +1,4 @@
-"""The questions that Python asks of a shape. Each kind answers in a file of its own, which `table` names."""
+"""The properties of a shape that Python needs. Each kind of shape has its own file with them, named in `table`."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ FclModel = tuple[str, tuple[Any, ...]]  # the name of FCL's class, and the argum
 
 @dataclass(frozen=True)
 class Block:
-    """A part of a shape with at most one curved side, in the shape's own frame; numbers are exact but for `radius`.
+    """A part of a shape with at most one curved side, in the shape's own frame. All numbers but `radius` are exact.
 
-    With `centre`, the block lies in the ball of `radius` about it, or with `axis` in the cylinder about that line. It
-    lies below `planes`, each a normal (3,) and an offset, and within `radius` of the hull of `spine` (k, 3), which is
-    None if the block has no end. Its planes cut off no more than the volume `lost` of the shape.
+    With `centre`, the block lies in the ball of `radius` about it. With `axis`, it lies in the cylinder of `radius`
+    about this line. The block lies below `planes`, each a normal (3,) and an offset. It lies within `radius` of the
+    hull of `spine` (k, 3), which is None if the block is unbounded. Its planes cut off at most the volume `lost`.
     """
 
     planes: Sequence[tuple[Exact, Fraction]]
@@ -36,12 +36,12 @@ class Block:
 
 
 class Facts(Protocol):
-    """The answers for one shape. Everything is in the shape's own frame, and in SI units."""
+    """The properties of one shape, in the shape's own frame and in SI units."""
 
-    name: str  # in a sentence, with its article
+    name: str  # for a sentence, with its article
     bounded: bool
     isotropic: bool  # no rotation about the origin changes it
-    has_blocks: bool  # it is made up of `blocks`, which each have at most one ball or cylinder
+    has_blocks: bool  # it consists of `blocks`, each with at most one ball or cylinder
     has_exits: bool  # `exits` are known exactly
     bullet_margin: bool  # Bullet collides with a margin around it
 
@@ -51,13 +51,13 @@ class Facts(Protocol):
         """The arguments with which its class makes the same shape."""
 
     def words(self) -> tuple[str, str, int]:
-        """Its kind, its dimensions in m, and the number of its corners, 0 for all but hulls, as an inventory lists."""
+        """Its kind, its dimensions in m, and its number of corners (0 for all but hulls), for an inventory."""
 
     def tessellation(self) -> Tessellation:
-        """Its surface as triangles; TypeError for a shape that is not bounded."""
+        """Its surface as triangles. TypeError for a shape that is not bounded."""
 
     def side(self, towards: Floats) -> tuple[Floats, float, Floats] | None:
-        """Unit normal, offset and corners (k, 3) of the flat side that faces a point most; None without flat sides.
+        """Unit normal, offset and corners (k, 3) of the flat side that best faces a point; None without flat sides.
 
         The side of a half-space has no corners.
         """
@@ -66,14 +66,14 @@ class Facts(Protocol):
         """Centre (3,) and radius of a ball around the shape; the radius is infinite if the shape is not bounded."""
 
     def fcl(self) -> FclModel | str:
-        """The shape for FCL, or the sentence that says why FCL is not asked."""
+        """The shape for FCL, or the sentence that says why FCL is not used."""
 
     def core_tip(self, direction: Floats) -> Floats:
-        """A farthest point (3,) of the shape less `rounding`; TypeError if its distances are not known exactly."""
+        """A farthest point (3,) of the shape without its `rounding`. TypeError if distances are not known exactly."""
 
     @property
     def rounding(self) -> float:
-        """The radius of a ball that `core_tip` leaves out: the shape is the Minkowski sum of the rest and the ball."""
+        """The radius of a ball that `core_tip` leaves out. The shape is the Minkowski sum of its core and this ball."""
 
     @property
     def planes(self) -> Planes | None:
@@ -81,7 +81,7 @@ class Facts(Protocol):
 
     @property
     def half_axes(self) -> Exact | None:
-        """The units of the axes in which the shape is a ball of radius 1; `blocks` are in these. None for 1 m."""
+        """The units of the axes in which the shape is a ball of radius 1; `blocks` use these units. None for 1 m."""
 
     def support(self, direction: Exact, scale: int) -> tuple[Fraction, Fraction] | None:
         """(flat, square): flat + sqrt(square) is the greatest direction . x / scale; None if there is none."""
@@ -89,11 +89,11 @@ class Facts(Protocol):
     def holds(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
         """Whether the shape holds the ball of radius `margin` about each of points (n, 3) / scale; points are integers.
 
-        True is proved. False may be said of a ball that just fits.
+        True is proved. False may be returned for a ball that just fits.
         """
 
     def tightest(self, point: Exact) -> Exact:
-        """The normal of the plane of the shape that a point is farthest above, of any length."""
+        """The normal, of any length, of the plane of the shape above which a point is highest."""
 
     def exits(self, start: Exact, arms: Exact, scale: int, fine: int) -> Exact:
         """The shares of arms (n, 3) at which rays from `start` leave the shape, in units of 2^-fine, rounded down.

@@ -51,7 +51,7 @@ class HalfSpaceFacts(Flat):
         raise TypeError(f"shape must be bounded, not {self.shape!r}")
 
     def support(self, direction: Exact, scale: int) -> tuple[Fraction, Fraction] | None:
-        """Only along its normal has a half-space an end."""
+        """A half-space is bounded only along its normal."""
         normal, offset = self.planes.normals[0], self.planes.offsets[0]
         if any(cross(normal, direction)) or direction @ normal < 0:
             return None

@@ -1,6 +1,6 @@
-"""Convex hulls, by the corners and triangles of the hull of the points as given.
+"""Convex hulls, by the corners and triangles of the hull of the given points.
 
-The corners are exact. The triangles are a suggestion that is checked.
+The corners are exact. The triangles are only proposed and are then checked.
 """
 
 from __future__ import annotations
@@ -74,16 +74,16 @@ class HullFacts(Flat):
 
     @cached_property
     def plane_of_triangle(self) -> list[Row | None]:
-        """Normal and offset of the plane of each triangle, as the least integers; None for those without area."""
+        """Normal and offset of the plane of each triangle, as the least integers; None for triangles without area."""
         (corners, unit), triangles = self.corners, self.shape.triangles
-        a, b, c = (corners.take(corner, axis=0) for corner in triangles.T)  # indexing may crash for want of memory
+        a, b, c = (corners.take(corner, axis=0) for corner in triangles.T)  # indexing may crash if memory is short
         normals = cross(b - a, c - a)
         offsets = (normals * a).sum(axis=1)
         solid = np.array([any(normal) for normal in normals])
         total = corners.sum(axis=0)
         if not is_closed(triangles) or any(normals[solid] @ total >= len(corners) * offsets[solid]):
             raise ValueError("triangles of a hull must be a closed surface around the mean of its corners")
-        # The offsets are in units of the corners, once more than the normals.
+        # The normals are in squared units of the corners, the offsets in cubed units.
         rows = np.column_stack([normals * unit, offsets])
         return [_lowest(row) if has_area else None for row, has_area in zip(rows, solid)]
 
@@ -91,14 +91,14 @@ class HullFacts(Flat):
     def planes(self) -> Planes:
         """The planes of the triangles.
 
-        A point below all planes of a hull's triangles is inside of the hull of the corners. The triangles close, so
-        their surface winds about a point that is on the inner side of each. No plane can then separate the point from
-        their corners. Points on some triangles are limits of such points, because the mean of the corners is one.
-        Triangles without area lie on the edges of others. The converse is not said: a hull may be larger than its
-        facets.
+        A point below all planes of a hull's triangles is inside the hull of the corners. The triangles form a closed
+        surface, which winds about every point on the inner side of all triangles. No plane can then separate the point
+        from the corners. Points on some triangles are limits of such points, because the mean of the corners is such a
+        point. Triangles without area lie on the edges of others. The converse is not claimed: a hull may be larger than
+        its facets.
         """
         rows = np.array(sorted({row for row in self.plane_of_triangle if row}), object)
-        # Integers of any size, brought to where doubles do not overflow.
+        # The rows are integers of any size; the factors scale them so that doubles do not overflow.
         return Planes(rows, np.array([Fraction(1, 2 ** max(map(int.bit_length, row[:3]))) for row in rows]))
 
     def support(self, direction: Exact, scale: int) -> tuple[Fraction, Fraction]:
@@ -110,7 +110,7 @@ class HullFacts(Flat):
         return in_doubles(corners, 1 << bits(corners))
 
     def _farthest(self, direction: Exact) -> int:
-        """The greatest product with a corner, both in integers: doubles leave a few to choose from."""
+        """The greatest product with a corner, in integers. Doubles leave only a few candidates."""
         d = in_doubles(direction, 1 << bits(direction))
         along = self._corners_in_doubles @ d
         doubt = DOUBT * (abs(self._corners_in_doubles) @ abs(d)) + UNDERFLOW
@@ -118,7 +118,7 @@ class HullFacts(Flat):
         return int(max(self.corners[0][few] @ direction))
 
     def nearest(self, point: Floats) -> Exact:
-        """A point of the hull, exactly, that is to rounding the nearest to a point outside."""
+        """An exact point of the hull that is, up to rounding, the nearest to a point outside."""
         corners, triangles = self.shape.corners, self.shape.triangles
         weights = nearest_weights(corners[triangles] - point)
         near = np.einsum("ki,kij->kj", weights, corners[triangles] - point)
@@ -128,7 +128,7 @@ class HullFacts(Flat):
         return nearest
 
     def blocks(self) -> list[Block]:
-        """The hull itself, if its corners are below all facets, so that it is no larger than they say."""
+        """The hull itself, if all its corners are below all facets, so that the hull is not larger than its facets."""
         corners, unit = self.corners
         if not self.planes.hold(corners, unit, 0).all():
             raise ValueError("a hull whose corners are not all below its facets has no certificate")

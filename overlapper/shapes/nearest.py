@@ -1,4 +1,4 @@
-"""The point of a triangle that is nearest to the origin, in doubles."""
+"""The point of a triangle nearest to the origin, in doubles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def nearest_weights(triangles: Floats) -> Floats:
     cu, cv = -np.einsum("ki,ki->k", corner, u), -np.einsum("ki,ki->k", corner, v)
     candidates = np.zeros((len(triangles), 4, 3))
     candidates[:, 0, 0] = 1.0
-    with np.errstate(divide="ignore", invalid="ignore"):  # a triangle without area has its edges
+    with np.errstate(divide="ignore", invalid="ignore"):  # for a triangle without area, its edges are used
         second, third = np.array([vv * cu - uv * cv, uu * cv - uv * cu]) / (uu * vv - uv * uv)
         first = 1.0 - second - third
         inside = (first >= 0.0) & (second >= 0.0) & (third >= 0.0)

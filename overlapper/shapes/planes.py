@@ -1,4 +1,4 @@
-"""The planes of the flat sides of a shape, exactly: which points are below, and where rays meet them."""
+"""The exact planes of the flat sides of a shape: which points are below them, and where rays meet them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ AXES: Exact = np.array([[Fraction(int(i == j)) for j in range(3)] for i in range
 class Planes:
     """{ x : normals @ x <= offsets }. Normals (k, 3) point outward; `rows` (k, 4) are integers, both times a factor.
 
-    Doubles leave a few candidates, and exact numbers choose among them.
+    Doubles select a few candidates, and exact numbers choose among them.
     """
 
     def __init__(self, rows: Exact, factors: Exact) -> None:
@@ -65,7 +65,7 @@ class Planes:
         return nearest
 
     def tightest(self, point: Exact) -> Exact:
-        """The normal of the plane that a point is farthest above."""
+        """The normal of the plane above which a point is highest."""
         x = point.astype(float)
         above = self.units @ x - self.levels
         few = np.flatnonzero(above >= above.max() - 1e-12 * (abs(x).sum() + abs(self.levels).max()))
@@ -90,7 +90,7 @@ class Planes:
         return inside
 
     def _not_surely_below(self, points: Exact, scale: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Pairs of a point and a plane for which doubles, with all their rounding, do not say that it is below."""
+        """Pairs of a point and a plane for which doubles, with their rounding, do not prove that the point is below."""
         unit = 1 << max(bits(points), scale.bit_length())
         x, (normals, offsets) = in_doubles(points, unit), self._in_doubles
         level = offsets * (scale / unit)

@@ -18,7 +18,7 @@ from overlapper.shapes.drawing import Tessellation
 from overlapper.shapes.facts import Block, Floats
 from overlapper.shapes.hull import HullFacts, Row
 
-# Bits to which the height of a prism is known, below 1.
+# The number of bits after the point to which the height of a prism is computed.
 PRISM = 320
 Edge = tuple[int, int]
 
@@ -43,7 +43,7 @@ class RoundedHullFacts(Round):
         return kind, f"{size}, rounded by {self.rounding:.4g}", corners
 
     def tessellation(self) -> Tessellation:
-        """With bevelled edges: the hull of the facets, each as far out as the radius."""
+        """A tessellation with bevelled edges: the hull of the facets, each moved outwards by the radius."""
         core = self.core.shape
         outward = [core.vertices[ring] + self.rounding * plane[:3] for ring, plane in zip(core.facets, core.halfspaces)]
         return HullFacts(Hull(np.concatenate(outward))).tessellation()
@@ -63,7 +63,7 @@ class RoundedHullFacts(Round):
         return tip, Fraction(self.rounding) ** 2 * Fraction(direction @ direction, scale * scale)
 
     def holds(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
-        """A point on the surface may be said to be outside: the nearest point of the core is only known to rounding."""
+        """A point on the surface may count as outside: the nearest point of the core is only known up to rounding."""
         room = Fraction(self.rounding) - margin
         inside = self.core.holds(points, scale, max(-room, Fraction(0)))
         for i in np.flatnonzero(~inside) if room >= 0 else ():
@@ -93,7 +93,7 @@ class RoundedHullFacts(Round):
         return [*core, *prisms, *self._wedges(sides), *self._caps(sides)]
 
     def _sides(self) -> dict[Row, list[Edge]]:
-        """For each plane the edges around its triangles; those without area go with the triangle at their long side."""
+        """For each plane, the edges around its triangles. A triangle without area joins the one at its long side."""
         owner: dict[Edge, Row] = {}
         thin = []
         for triangle, plane in zip(self.core.shape.triangles.tolist(), self.core.plane_of_triangle):
@@ -120,7 +120,7 @@ class RoundedHullFacts(Round):
         return sides
 
     def _along(self, edge: Edge) -> Exact:
-        """In units of the corners."""
+        """The vector along an edge, in units of the corners."""
         corners, _ = self.core.corners
         along: Exact = corners[edge[1]] - corners[edge[0]]
         return along
@@ -137,7 +137,7 @@ class RoundedHullFacts(Round):
         return points
 
     def _plane(self, normal: Exact, corner: int) -> tuple[Exact, Fraction]:
-        """Through a corner."""
+        """The plane with this normal through a corner."""
         corners, unit = self.core.corners
         return normal, Fraction(normal @ corners[corner], unit)
 
@@ -151,7 +151,7 @@ class RoundedHullFacts(Round):
         ring = self._points[sorted({p for edge in edges for p in edge})]
         spine = np.vstack([ring, ring + normal * (rise / square)])
         area = Fraction(float(np.linalg.norm(np.ptp(ring.astype(float), axis=0))) * (1.0 + 2.0**-40)) ** 2
-        # The height lost is 2^-PRISM of all or less.
+        # At most the share 2^-PRISM of the height is lost.
         lost = Fraction(0) if is_exact else area * Fraction(self.rounding) / 2**PRISM
         return Block(planes, spine, lost=lost)
 
@@ -161,7 +161,7 @@ class RoundedHullFacts(Round):
         alongs = np.array([self._along(edge) for edge in once])
         left = np.array([plane_at[edge][:3] for edge in once], object)
         right = np.array([plane_at[q, p][:3] for p, q in once], object)
-        # Seen along the edge the first facet is on the left, so that the wedge is on the right of its normal.
+        # Seen along the edge, the first facet is on the left. The wedge is therefore on the right of its normal.
         walls = zip(cross(left, alongs), cross(alongs, right))
         found = []
         for (p, q), along, (one, other) in zip(once, alongs, walls):
@@ -182,7 +182,7 @@ class RoundedHullFacts(Round):
 
 
 def _root_below(square: Fraction) -> tuple[Fraction, bool]:
-    """The square root, not above and by at most 2^-PRISM of it below; and whether it is exact."""
+    """A lower bound of the square root, less by at most 2^-PRISM of it, and whether the bound is exact."""
     p, q = square.numerator, square.denominator
     shift = max(0, PRISM + (q.bit_length() - p.bit_length()) // 2 + 1)
     floor = math.isqrt((p << 2 * shift) // q)

@@ -67,5 +67,5 @@ class SphereFacts(Round):
 
 
 def outward(arm: Floats) -> Floats:
-    """A direction from the centre to a point at `arm`; along x if that is the centre."""
+    """The direction from the centre to a point at `arm`; along x if the point is the centre."""
     return arm if arm.any() else np.array([1.0, 0.0, 0.0])

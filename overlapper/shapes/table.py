@@ -1,4 +1,4 @@
-"""The one table that says which file knows which kind of shape."""
+"""The table of kinds of shapes, with the class of `Facts` for each."""
 
 from __future__ import annotations
 
@@ -27,5 +27,5 @@ KINDS: dict[type, type[Facts]] = {
 
 
 def facts(shape: Shape) -> Facts:
-    """The answers for a shape."""
+    """The facts about a shape."""
     return KINDS[type(shape)](shape)

@@ -1,8 +1,8 @@
 """The collision shapes of a running pybullet simulation, and their overlaps.
 
-Shapes are read once, poses at every step. Surfaces are the nominal ones or, with surface="margin", those that Bullet
-collides with. Bullet lays a margin of 1 mm around convex hulls: mesh shapes, and the `<cylinder>` of a URDF, which it
-makes a 32-gon hull. Pairs are those that the simulator lets collide.
+Shapes are read once, and poses at every step. Surfaces are nominal or, with surface="margin", those that Bullet
+collides with. Bullet lays a margin of 1 mm around convex hulls. These are mesh shapes, and the `<cylinder>` of a URDF,
+which becomes a 32-gon hull. Pairs are those that the simulator lets collide.
 """
 
 from typing import TYPE_CHECKING
@@ -52,7 +52,7 @@ __all__ = [
     "link_contacts",
 ]
 
-# These names are imported when they are asked for. pybullet prints its build time on import, and not all need it.
+# These names are imported on first use. pybullet prints its build time on import, and not all of them need it.
 __getattr__ = lazily(
     __name__,
     {

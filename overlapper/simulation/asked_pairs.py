@@ -1,4 +1,4 @@
-"""Which pairs of shapes are asked for: those that the simulator lets collide, all, or those of a list."""
+"""The chosen pairs of shapes: those that the simulator lets collide, all pairs, or the pairs of a list."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Numbered = Literal["simulated", "all"] | Iterable[tuple[Who, Who]]  # without na
 
 
 def listed(pairs: Any) -> list[tuple[Any, Any]]:
-    """A list of pairs; two bodies or names are one pair. ValueError if `pairs` is no list of pairs."""
+    """`pairs` as a list of pairs. Two bodies or names are one pair. ValueError if `pairs` is not a list of pairs."""
     asked = list(pairs) if isinstance(pairs, Iterable) else None
     if asked and len(asked) == 2 and all(isinstance(each, (int, str)) for each in asked):
         asked = [tuple(asked)]
@@ -30,14 +30,14 @@ def listed(pairs: Any) -> list[tuple[Any, Any]]:
 
 
 class AskedPairs:
-    """The choice among the pairs of a layout, whose bodies have these `links`; a list is kept for the next step."""
+    """The chosen pairs of a layout, whose bodies have these `links`. The codes of a list are kept for the next step."""
 
     def __init__(self, layout: Layout, links: Mapping[int, Collection[int]]) -> None:
         self.layout, self._links = layout, links
         self._listed: tuple[list[tuple[Who, Who]], Codes] | None = None
 
     def chosen(self, pairs: NDArray[np.int32], among: Numbered, rules: Rules) -> Mask:
-        """Which of these pairs of shapes are asked for."""
+        """Which of these pairs of shapes are chosen."""
         first, second = pairs.T
         if among == "all":
             return np.asarray(self.layout.owners[first] != self.layout.owners[second])
@@ -47,7 +47,7 @@ class AskedPairs:
         return np.asarray((a != b) & rules.allow(a, b))
 
     def possible(self, among: Numbered, rules: Rules) -> int:
-        """How many pairs of shapes are asked for, wherever they are."""
+        """The number of chosen pairs of shapes, at any poses."""
         if among == "simulated":
             layout = self.layout
             return rules.count(np.bincount(layout.colliders, minlength=len(layout.collider_rows)))
@@ -57,7 +57,7 @@ class AskedPairs:
         return int(len(self.layout.owners) ** 2 - (of_each**2).sum()) // 2
 
     def colliders(self, among: Numbered, rules: Rules) -> NDArray[np.intp]:
-        """(n, 2) the pairs of links that are asked for, wherever they are, as values of `layout.collider_rows`."""
+        """(n, 2) the chosen pairs of links, at any poses, as values of `layout.collider_rows`."""
         layout = self.layout
         if among != "simulated" and among != "all":
             pairs = layout.colliders[np.array(np.divmod(self._codes(among), len(layout.keys)))].T
@@ -68,7 +68,7 @@ class AskedPairs:
         return np.stack([first[chosen], second[chosen]], axis=1)
 
     def _codes(self, among: Iterable[tuple[Who, Who]]) -> Codes:
-        """The pairs of a list, as `pair_codes` has them."""
+        """The `pair_codes` of a list."""
         if isinstance(among, str):
             raise ValueError(f"pairs must be 'simulated', 'all' or a list of pairs, not {among!r}")
         asked = list(among)
@@ -78,10 +78,10 @@ class AskedPairs:
 
 
 def pair_codes(asked: Sequence[tuple[Who, Who]], keys: Sequence[Key], links: Mapping[int, Collection[int]]) -> Codes:
-    """The pairs of shapes that a list stands for, each as one number: i * len(keys) + j for keys[i] and keys[j], i < j.
+    """The pairs of shapes that a list means. Each pair is one number: i * len(keys) + j for keys[i] and keys[j], i < j.
 
-    A body stands for all of its shapes, and so does a link; two shapes of one link are a pair only if both are named as
-    shapes. `links` are those of each body. ValueError if a body or link is not there.
+    A body or a link means all of its shapes. Two shapes of one link are a pair only if both are named as shapes.
+    `links` are those of each body. ValueError if a body or link is missing.
     """
     places: dict[Who, Codes] = {}
     for who in {each for pair in asked for each in pair}:

@@ -30,17 +30,17 @@ Which = TypeVar("Which", bound="AnyBodies")
 
 
 class AnyBodies:
-    """The bodies of a simulation as convex shapes placed in the world, whatever simulates them.
+    """The bodies of a simulation as convex shapes placed in the world, for any simulator.
 
     A `Source` answers for the simulator. `Bodies` of a simulator inherits from this class and makes its source.
     """
 
     def __init__(self, source: Source) -> None:
-        """For the constructors of classes that inherit: warnings name the line that calls these."""
+        """Call this from the constructor of a subclass: warnings then name the line that calls that constructor."""
         self._source = source
         self._grounds = Grounds()
         self._nowhere: set[int] = set()  # bodies without a finite pose
-        # The pairs that the last overlaps() was asked for, or their number if they were a list, and its result.
+        # The choice of pairs of the last overlaps(), or the number of pairs if it was a list; then the result.
         self._asked: Literal["simulated", "all"] | int = "simulated"
         self._found = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
         self._last: tuple[Contacts, Layout, partial[Mask]] | None = None
@@ -50,12 +50,12 @@ class AnyBodies:
     def update(self) -> None:
         """Read the shapes of new bodies and changed filters, then all poses. Call it once per step.
 
-        Whether a base has become static, its mass 0, is asked when it has not moved since the last update.
+        A base that has not moved since the last update is asked whether it has become static (mass 0).
         """
         self._refresh(stacklevel=3)
 
     def follow(self) -> None:
-        """Read all poses, as `update()` does, of the bodies that there were then; those that come or go are missed."""
+        """Read all poses of the bodies known at the last `update()`. Bodies that come or go are not noticed."""
         if self._pose() != self._nowhere:
             self._refresh(stacklevel=3)
 
@@ -68,8 +68,8 @@ class AnyBodies:
     ) -> Contacts:
         """Pairs of shapes that overlap or touch, sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB).
 
-        `tolerance`, `method` and `threads` are those of `overlapper.overlaps`, `pairs` is what `Bodies.pairs` is asked
-        for. Results are kept for the next call: a pair costs nothing if neither of its shapes has moved by a bit.
+        `tolerance`, `method` and `threads` are those of `overlapper.overlaps`. `pairs` is the choice that
+        `Bodies.pairs` takes. A result is reused in the next call if the poses of both shapes are bit-identical.
         """
         among: Numbered = pairs if isinstance(pairs, str) else self._asked_for(pairs)
         if among == "simulated":
@@ -85,30 +85,30 @@ class AnyBodies:
         return contacts
 
     def pairs(self, among: Among = "simulated") -> NDArray[np.int32]:
-        """(n, 2) pairs of shapes whose boxes meet, as places in `keys`: each once, the lesser first, sorted.
+        """(n, 2) pairs of shapes whose boxes meet, as indices into `keys`: each once, the lesser first, sorted.
 
-        "simulated" are those that the simulator lets collide, "all" those of different bodies, whatever it does. Any
+        "simulated" means the pairs that the simulator lets collide. "all" means all pairs of different bodies. Any
         other choice is a list of pairs of bodies, links (body, link) or shapes (body, link, shape), as [(robot, table),
-        ((robot, 8), (robot, 3))]. It may name two links of one body, and no filter is asked. Names stand for bodies and
-        links: [("table", "panda/panda_hand")], as `names` has them. One pair of bodies or names needs no list around
-        it. A body paired with itself stands for all pairs of its links. ValueError if there is no such body or link.
+        ((robot, 8), (robot, 3))]. A list may pair two links of one body, and it ignores collision filters. Bodies and
+        links may be given by their `names`: [("table", "panda/panda_hand")]. A single pair of bodies or names needs no
+        list around it. A body paired with itself means all pairs of its links. ValueError if a body or link is missing.
         """
         return self.pairs_at(self.positions, self.orientations, among)
 
     def pairs_at(self, positions: Array, orientations: Array, among: Among = "simulated") -> NDArray[np.int32]:
-        """The same if the shapes were at `positions` (k, 3) and `orientations` (k, 4), parallel to `keys`."""
+        """As `pairs`, with the shapes at `positions` (k, 3) and `orientations` (k, 4), parallel to `keys`."""
         asked: Numbered = among if isinstance(among, str) else self._asked_for(among)
         pairs: NDArray[np.int32] = self._layout.batch.candidate_pairs(positions, orientations)
         return np.asarray(pairs[self._pairs.chosen(pairs, asked, self._rules)])
 
     def partners(self) -> dict[tuple[int, int], list[tuple[int, int]]]:
-        """The links that the simulator lets each link collide with, by (body, link), of those that have shapes."""
+        """For each link with shapes, by (body, link): the links with shapes that the simulator lets it collide with."""
         return partners(self._rules, [*self._layout.collider_rows], np.unique(self._layout.colliders))
 
     def report(self) -> Report:
         """How much of the scene was read, and how much of it the last `overlaps()` looked at.
 
-        Asks for pybullet's contact points, which takes about 3 µs for each.
+        It asks pybullet for its contact points, which takes about 3 µs for each point.
         """
         found, asked, bodies = self._found, self._asked, self._source.bodies
         return Report(
@@ -125,7 +125,7 @@ class AnyBodies:
         )
 
     def link_pairs(self, among: Among = "simulated") -> list[tuple[LinkKey, LinkKey]]:
-        """The pairs of links ((body, link), (body, link)) whose shapes `pairs` looks at, wherever they are; sorted."""
+        """The pairs of links ((body, link), (body, link)) that `among` chooses, at any poses; sorted."""
         asked: Numbered = among if isinstance(among, str) else self._asked_for(among)
         links = [*self._layout.collider_rows]
         return [(links[a], links[b]) for a, b in self._pairs.colliders(asked, self._rules).tolist()]
@@ -135,7 +135,7 @@ class AnyBodies:
         return self._source.mechanics()
 
     def close(self) -> None:
-        """Leave the simulation as it was found. The bodies read so far stay; they cannot be updated any more."""
+        """Restore the simulation to its earlier state. The bodies read so far stay, but cannot be updated any more."""
         self._source.close()
 
     def __repr__(self) -> str:
@@ -160,12 +160,12 @@ class AnyBodies:
 
     @property
     def positions(self) -> Array:
-        """(k, 3) positions in metres of the shapes, not of their links, at the last update; parallel to `keys`."""
+        """(k, 3) positions of the shapes (not of their links) at the last update, m; parallel to `keys`."""
         return self._layout.positions
 
     @property
     def orientations(self) -> Array:
-        """(k, 4) unit quaternions xyzw of the shapes, not of their links, at the last update; parallel to `keys`."""
+        """(k, 4) unit quaternions xyzw of the shapes (not of their links) at the last update; parallel to `keys`."""
         return self._layout.orientations
 
     @property
@@ -175,15 +175,15 @@ class AnyBodies:
 
     @property
     def colors(self) -> dict[tuple[int, int], Color]:
-        """Red, green, blue and alpha in 0..1 by (body, link): of the visual shape, as it was when the body was read.
+        """Red, green, blue and alpha in 0..1 by (body, link): of the visual shape when the body was read.
 
-        A link without a visual shape has its body's colour, a body without any a colour of its own.
+        A link without a visual shape has the colour of its body. A body without visual shapes gets its own colour.
         """
         return {(id, link): color for id, body in self._source.bodies.items() for link, color in body.colors.items()}
 
     @property
     def names(self) -> dict[tuple[int, int], str]:
-        """Names like "panda/panda_hand" by (body, link); those that several would share end in "#" and the id."""
+        """Names like "panda/panda_hand" by (body, link). Names that are not unique end in "#" and the id."""
         return dict(self._names)
 
     @property
@@ -193,12 +193,12 @@ class AnyBodies:
 
     @property
     def settings(self) -> dict[str, str | float]:
-        """`concave`, `concave_threshold` and `surface`, as they were given."""
+        """The given values of `concave`, `concave_threshold` and `surface`."""
         return dict(self._source.settings)
 
     @property
     def engine(self) -> str:
-        """The name of the engine that simulates the bodies, as ENGINE of a scene has it."""
+        """The name of the engine that simulates the bodies, as in ENGINE of a scene."""
         return self._source.engine
 
     @property
@@ -209,12 +209,12 @@ class AnyBodies:
 
     @property
     def rules(self) -> Rules:
-        """Which links the simulator lets collide; another object once that may have changed."""
+        """Which links the simulator lets collide. The object is replaced when the rules may have changed."""
         return self._rules
 
     @property
     def time_step(self) -> float:
-        """s that a step of the simulator takes."""
+        """The time step of the simulator, s."""
         return self._source.time_step
 
     def _refresh(self, stacklevel: int) -> None:
@@ -236,7 +236,7 @@ class AnyBodies:
             warnings.warn(message, SkippedShapeWarning, stacklevel=stacklevel)
 
     def _asked_for(self, pairs: Iterable[tuple[Who | str, Who | str]]) -> list[tuple[Who, Who]]:
-        """The pairs of a list, by numbers. Pairs that are numbers already stay as they are."""
+        """The pairs of a list, with names replaced by numbers."""
         return [(self._who(a), self._who(b)) for a, b in listed(pairs)]
 
     def _who(self, named: Who | str) -> Who:
@@ -267,6 +267,6 @@ class AnyBodies:
         self._grounds.follow(self._layout, placed)
 
     def _pose(self) -> set[int]:
-        """Place all bodies; those that have no usable pose."""
+        """Place all bodies. Returns the bodies without a usable pose."""
         nowhere = self._layout.pose()
         return nowhere | self._left_out.pose() if self._nowhere else nowhere

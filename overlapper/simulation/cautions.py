@@ -1,20 +1,20 @@
-"""The warnings of this package; they are known without a simulator, so that they can be waited for."""
+"""The warnings of this package. They can be imported without a simulator, so that filters can name them."""
 
 
 class SkippedShapeWarning(UserWarning):
-    """A shape of the simulation is not modelled: its overlaps are not found."""
+    """A shape of the simulation is not modelled, so its overlaps are not found."""
 
 
 class UnknownBodyWarning(UserWarning):
-    """A body is named that is not in the simulation."""
+    """A name is given to a body that is not in the simulation."""
 
 
 class SelfCollisionWarning(UserWarning):
-    """pybullet keeps links of a body apart that are no pair here: their overlaps are not looked for."""
+    """pybullet lets two links of a body collide that are not a pair here, so their overlaps are not looked for."""
 
 
 class NoDirectionWarning(UserWarning):
-    """A body lies within another or goes through it: what they share has no side to push to."""
+    """A body lies within another or goes through it, so their overlap has no side to push to."""
 
 
 class SubstepsWarning(UserWarning):

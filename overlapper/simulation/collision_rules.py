@@ -17,10 +17,10 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Colliders:
-    """The links of a scene side by side.
+    """The links of a scene as arrays.
 
-    `rows` is the place of each by body and link, `body` (n,) its body, `group` and `mask` (n,) are
-    those of its collision filter.
+    `rows` is the row of each link by (body, link), and `body` (n,) is its body. `group` and `mask` (n,) are those of
+    its collision filter.
     """
 
     rows: Mapping[LinkKey, int]
@@ -30,13 +30,13 @@ class Colliders:
 
     @classmethod
     def of(cls, rows: Mapping[LinkKey, int], filters: Mapping[LinkKey, tuple[int, int]]) -> Colliders:
-        """With group and mask by link; a link without a filter is of group 1 and meets all."""
+        """From group and mask by link. A link without a filter has group 1 and a mask that admits all groups."""
         group, mask = np.array([filters.get(each, (1, -1)) for each in rows], dtype=int).reshape(-1, 2).T
         return cls(rows, np.array([body for body, _ in rows], dtype=int), group, mask)
 
 
 class Rules(Protocol):
-    """Which colliders may collide; a collider is a row of `Layout.collider_rows`."""
+    """Which colliders may collide. A collider is given by its row in `Layout.collider_rows`."""
 
     def allow(self, first: Indices, second: Indices) -> Mask:
         """Whether the colliders in these rows may collide, pair by pair; first < second."""
@@ -48,7 +48,7 @@ class Rules(Protocol):
 class MaskRules(Rules):
     """The rules of groups, masks and exceptions.
 
-    Pair filters come before masks; within a body, pairs that are listed, as well as either.
+    Pair filters override masks. Two links of one body may collide only if the pair is listed, too.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class MaskRules(Rules):
         filters: Mapping[tuple[LinkKey, LinkKey], bool] | None = None,
         within: Iterable[tuple[LinkKey, LinkKey]] = (),
     ) -> None:
-        """`both` masks must admit the other's group, or one is enough; `filters` say of pairs whether they may collide.
+        """With `both`, both masks must admit the other's group; otherwise one is enough. `filters` override masks.
 
         `within` are the pairs of links of one body that may collide. In each pair the lesser link comes first.
         """
@@ -70,7 +70,7 @@ class MaskRules(Rules):
         self._within = self._sorted([(rows[a], rows[b], True) for a, b in within])[0]
 
     def _code(self, first: Indices, second: Indices) -> Indices:
-        """Pairs of colliders as one number each."""
+        """Each pair of colliders as one number."""
         return np.asarray(first * len(self._colliders.body) + second)
 
     def _sorted(self, pairs: list[tuple[int, int, bool]]) -> tuple[Indices, Mask]:
@@ -106,7 +106,7 @@ class MaskRules(Rules):
         admitted = self._masks_admit(filters[:, None, 0], filters[:, None, 1], filters[None, :, 0], filters[None, :, 1])
         total = shapes.sum(axis=0)
         pairs = int((admitted * (np.outer(total, total) - shapes.T @ shapes)).sum()) // 2
-        # Pairs on which the masks alone do not decide are counted one by one.
+        # Pairs with a filter, and pairs within a body, are counted one by one.
         codes = np.union1d(self._filtered, self._within)
         first, second = np.divmod(codes, max(len(c.body), 1))
         by_masks = self._masks_admit(c.group[first], c.mask[first], c.group[second], c.mask[second])
@@ -116,7 +116,7 @@ class MaskRules(Rules):
 
 
 def _places(codes: Indices, wanted: Indices) -> tuple[Indices, Mask]:
-    """Where each of `wanted` would be among sorted codes, and whether it is there."""
+    """The insertion place of each of `wanted` in sorted codes, and whether it is among them."""
     place = np.searchsorted(codes, wanted)
     found = place < len(codes)
     found[found] = codes[place[found]] == wanted[found]
@@ -124,7 +124,7 @@ def _places(codes: Indices, wanted: Indices) -> tuple[Indices, Mask]:
 
 
 def partners(rules: Rules, links: Sequence[LinkKey], rows: Indices) -> dict[LinkKey, list[LinkKey]]:
-    """With whom each of the colliders in these rows, sorted, may collide; `links` are those of all rows."""
+    """The partners with which each collider in these sorted rows may collide. `links` are those of all rows."""
     found: dict[LinkKey, list[LinkKey]] = {links[row]: [] for row in rows}
     first, second = (rows[each] for each in np.triu_indices(len(rows), 1))
     allowed = rules.allow(first, second)

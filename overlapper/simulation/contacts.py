@@ -20,9 +20,9 @@ STATUS = np.array(["separated", "touching", "overlapping"])  # by the numbers of
 class Contact:
     """Two shapes that overlap or touch; `overlap.status` says which.
 
-    Bodies (`bodyA`, `bodyB`) and links (`linkA`, `linkB`) are pybullet's indices, link -1 is the base, and shapes
-    (`shapeA`, `shapeB`) are counted within their link. A is the lesser of the two; `overlap.shapes[0]` is A's, so that
-    `overlap.normal` points from B to A as pybullet's contactNormalOnB does.
+    Bodies (`bodyA`, `bodyB`) and links (`linkA`, `linkB`) are pybullet's indices, and link -1 is the base. Shapes
+    (`shapeA`, `shapeB`) are counted within their link. A is the lesser of the two, and `overlap.shapes[0]` is its
+    shape. `overlap.normal` points from B to A, as pybullet's contactNormalOnB does.
     """
 
     bodyA: int
@@ -35,17 +35,17 @@ class Contact:
 
     @property
     def solids(self) -> tuple[int, int, int, int]:
-        """(bodyA, linkA, bodyB, linkB): what moves as one with either shape."""
+        """(bodyA, linkA, bodyB, linkB): the rigid solids of the two shapes."""
         return self.bodyA, self.linkA, self.bodyB, self.linkB
 
 
 class Contacts(Tabular, Sequence[Contact]):
-    """Contacts sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB); each is made when it is looked at, and kept.
+    """Contacts sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB). Each is made on first access, and kept.
 
-    `overlaps` has volumes, centroids, normals, depths, gradients and more as arrays, a row per contact, which cost
-    nothing more. A slice, a mask or an array of indices picks contacts: `contacts[contacts.overlaps.depth > 1e-3]`.
-    `names` are those of the links, by (body, link), and `kind` is the class of each contact. As a table, by
-    `to_pandas()` and its like, contacts have the columns of `overlapper run` but for its steps and poses.
+    `overlaps` has volumes, centroids, normals, depths, gradients and more as arrays, one row per contact, at no extra
+    cost. A slice, a mask or an array of indices picks contacts: `contacts[contacts.overlaps.depth > 1e-3]`. `names` are
+    those of the links, by (body, link), and `kind` is the class of each contact. `to_pandas()` and similar methods make
+    tables with the columns of `overlapper run`, without steps and poses.
     """
 
     __slots__ = ("_keys", "_made", "kind", "names", "overlaps")
@@ -57,7 +57,7 @@ class Contacts(Tabular, Sequence[Contact]):
         names: Mapping[tuple[int, int], str] | None = None,
         kind: type[Contact] = Contact,
     ) -> None:
-        """`keys` (k, 3) are body, link and shape of what the pairs of `overlaps` index."""
+        """`keys` (k, 3) are body, link and shape of each shape that the pairs of `overlaps` index."""
         self.overlaps = overlaps
         self.names = names or {}
         self.kind = kind
@@ -99,7 +99,7 @@ class Contacts(Tabular, Sequence[Contact]):
         return Contacts, (self._keys, self.overlaps, dict(self.names), self.kind)
 
     def columns(self) -> Columns:
-        """The columns of the table by name, each an array or a list with a value for each row."""
+        """The columns of the table by name, each an array or a list with one value per row."""
         found = self.overlaps
         keys = self.keys
         columns: Columns = {}

@@ -1,4 +1,4 @@
-"""The ground of height fields, modelled below what may meet it: more of it where bodies come, none where they were."""
+"""The ground of height fields, modelled only below shapes that may meet it, and updated as the shapes move."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from overlapper.simulation.model import BASE, Array, Ground, ModelledBody
 
 
 class GroundBelow:
-    """Which triangles of a height field shapes are near; shapes that have hardly moved are not asked about again."""
+    """The triangles of a height field near shapes. For shapes that have hardly moved, they are not searched again."""
 
     def __init__(self, ground: Ground, reach: Array) -> None:
-        """`reach` (n,) in m says how far the shapes reach from their centres."""
+        """`reach` (n,) in m is how far the shapes extend from their centres."""
         self.ground = ground
         self._reach = reach
-        # Ground is modelled so far beyond what a shape meets: it is not asked again until it has come as far.
+        # The ground is modelled this far around a shape, and searched again when the shape has moved this far.
         self._slack = np.maximum(min(ground.field.spacing) / 2, reach / 4)
         self._asked = np.full((len(reach), 3), np.inf)
         self._near: list[Numbers] = [np.empty(0, dtype=np.int64)] * len(reach)
 
     def moved(self, position: Array, orientation: Array, centres: Array, meets: Mask) -> bool:
-        """Whether any of the shapes that `meets` picks has come to where the ground below it has to be asked for.
+        """Search the ground below the shapes in `meets` that have moved too far. True if there were any.
 
-        The field's collider is at `position` and `orientation`, xyzw, the shapes at `centres` (n, 3) in the world.
+        The field's collider is at `position` and `orientation`, xyzw. The shapes are at `centres` (n, 3) in the world.
         """
         turn = composed(orientation, self.ground.orientation)
         origin = position + rotated(orientation, self.ground.position)
@@ -44,7 +44,7 @@ class GroundBelow:
         return bool(moved.any())
 
     def numbers(self) -> set[int]:
-        """The numbers of the triangles that any of the shapes is near."""
+        """The numbers of the triangles near any of the shapes."""
         return set(np.unique(np.concatenate([np.empty(0, dtype=np.int64), *self._near])).tolist())
 
 
@@ -58,7 +58,7 @@ class Grounds:
         self._shapes: list[Shape] = []
 
     def follow(self, layout: Layout, bodies: Mapping[int, ModelledBody]) -> None:
-        """Bodies have come or gone, and have these places now."""
+        """Follow a new layout, after bodies have come or gone."""
         grounds = {id: body.ground for id, body in bodies.items() if body.ground and (id, BASE) in layout.collider_rows}
         self._rows = np.flatnonzero(~np.isin(layout.owners, [*grounds]))
         shapes = [layout.shapes[row] for row in self._rows] if grounds else []
@@ -71,9 +71,9 @@ class Grounds:
         self._below = {id: same.get(id) or GroundBelow(ground, reach) for id, ground in grounds.items()}
 
     def changed(self, layout: Layout, rules: Rules, bodies: Mapping[int, ModelledBody]) -> dict[int, ModelledBody]:
-        """The height fields that need more prisms, or that need less than half of theirs.
+        """The height fields that need more prisms, or fewer than half of their prisms, with the new prisms.
 
-        They come with the prisms that the simulator lets shapes meet, and a little around these.
+        The new prisms are those that shapes may meet by the simulator's rules, and some around them.
         """
         found: dict[int, ModelledBody] = {}
         colliders = layout.colliders[self._rows]

@@ -1,4 +1,4 @@
-"""Height fields: a grid of heights, two triangles to a cell, and the ground below them solid."""
+"""Height fields: a grid of heights with two triangles per cell, and solid ground below them."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class HeightField:
     """The ground under a grid of heights, in the frame of its shape.
 
     `heights` (c, r) in m are those at x = (i - (r - 1) / 2) * spacing[0], y = (j - (c - 1) / 2) * spacing[1] for row j
-    and column i of the array. Each cell is cut into two triangles from its corner at i + 1 to the one at j + 1. The
-    triangles of the cell (i, j) have the numbers 2 * (j * (r - 1) + i) and the next.
+    and column i of the array. Each cell is cut into two triangles, from its corner at i + 1 to its corner at j + 1. The
+    triangles of the cell (i, j) have the numbers n = 2 * (j * (r - 1) + i) and n + 1.
     """
 
     heights: Array
     spacing: tuple[float, float]
     middle: float = 0.0
-    """m: what the simulator has taken off the heights that it was given."""
+    """The height that the simulator has subtracted from the given heights, m."""
 
     @property
     def count(self) -> int:
@@ -37,12 +37,12 @@ class HeightField:
 
     @cached_property
     def base(self) -> float:
-        """m: how far down the ground is solid, as far below its lowest point as the field is wide."""
+        """The bottom of the solid ground, m. It is as far below the lowest point as the field is wide."""
         columns, rows = self.heights.shape
         return float(self.heights.min() - max((rows - 1) * self.spacing[0], (columns - 1) * self.spacing[1]))
 
     def under(self, lower: Array, upper: Array) -> Numbers:
-        """The numbers of the triangles that the box between two corners may meet from above or in the ground."""
+        """The numbers of the triangles whose ground a box may meet; `lower` and `upper` are corners of the box."""
         columns, rows = self.heights.shape
         if lower[2] > self.heights.max():
             return np.empty(0, dtype=np.int64)

@@ -11,9 +11,9 @@ from types import ModuleType
 
 
 def when_imported(library: str, then: Callable[[], object]) -> None:
-    """Call `then` once the library has been imported, by whomever; now, if it is there already.
+    """Call `then` after the library is imported by any code, or now if it is imported already.
 
-    A script may set what a library reads on import, such as MUJOCO_GL, so nobody imports the library before the script.
+    A script may set variables that a library reads on import, such as MUJOCO_GL. So nothing imports it earlier.
     """
     if library in sys.modules:
         then()
@@ -22,7 +22,7 @@ def when_imported(library: str, then: Callable[[], object]) -> None:
 
 
 class _Finder(MetaPathFinder):
-    """Finds one library as the other finders do, once, with a loader that calls `then` at its end."""
+    """Finds one library once, by the other finders. Its loader calls `then` at the end."""
 
     def __init__(self, library: str, then: Callable[[], object]) -> None:
         self._library, self._then = library, then
@@ -47,7 +47,7 @@ class _Loader(Loader):
         return self._loader.create_module(spec)
 
     def exec_module(self, module: ModuleType) -> None:
-        # The module has its own loader again, as if nothing had been between.
+        # The module gets its original loader back, so that it shows no trace of this loader.
         if module.__spec__:
             module.__spec__.loader = self._loader
         module.__loader__ = self._loader

@@ -1,6 +1,6 @@
 """The links of a robot's file with their shapes, and the joints that move them.
 
-A `Joint` is enough to place its link without a simulator.
+A `Joint` suffices to place its link without a simulator.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ Kind = Literal["revolute", "prismatic", "spherical", "planar", "held"]
 class Joint:
     """A joint moves a link in its parent, or ties a base to the world without moving it.
 
-    The joint's frame, at zero, is at `position` (3,) in m and `orientation` (4,) xyzw of the inertial frame of the
-    parent. A revolute joint turns it by an angle in rad about `axis` (3,), which is unit. A prismatic one moves it by
-    so many times `axis`. A spherical one turns it by a quaternion. A planar one, which pybullet never moves, and what
-    is "held" stay as they are. `offset` (3,) leads from there to the inertial frame of the link, which has the same
-    axes.
+    At zero, the frame of the joint is at `position` (3,) in m and `orientation` (4,) xyzw in the inertial frame of the
+    parent. The `kind` says how it moves. A revolute joint turns it by an angle in rad about the unit `axis` (3,). A
+    prismatic joint moves it by a multiple of `axis`. A spherical joint turns it by a quaternion. A "planar" joint,
+    which pybullet never moves, and a "held" joint leave it in place. `offset` (3,) leads from the joint's frame to the
+    inertial frame of the link, which has the same axes.
 
-    `lower` and `upper` are the limits in rad or m; there are none if lower > upper, and of spherical joints.
+    `lower` and `upper` are the limits in rad or m. There are no limits if lower > upper, or for spherical joints.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """A joint that stands at multiplier * q + offset where q, in rad or m, is that of the joint called `leader`."""
+    """A joint at multiplier * q + offset, where q, in rad or m, is the position of the joint named `leader`."""
 
     leader: str
     multiplier: float
@@ -48,11 +48,11 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True)
 class TreeLink:
-    """A link of the body of that number, named as in the file; `parent` is its place among the links, -1 of a base.
+    """A link of the body with number `body`, named as in the file. `parent` is the index of its parent, -1 for a base.
 
-    `skipped` says what of its shapes is not modelled and why, "" if all are. `concave` is the number of convex parts of
-    its concave meshes. `excess` is the fraction by which parts have more volume than their mesh, of the mesh that gains
-    most; None if no closed mesh is concave.
+    `skipped` says which of its shapes are not modelled and why; it is "" if all are modelled. `concave` is the number
+    of convex parts of its concave meshes. `excess` is the largest relative increase of volume from a mesh to its parts;
+    None if no closed mesh is concave.
     """
 
     body: int
@@ -66,7 +66,7 @@ class TreeLink:
 
 @dataclass(frozen=True, slots=True)
 class LinkShape:
-    """A modelled shape of the link in that place, at `position` (3,) and `orientation` (4,) of its inertial frame."""
+    """A modelled shape of the link with that index, at `position` (3,) and `orientation` (4,) in its inertial frame."""
 
     link: int
     shape: Shape
@@ -76,7 +76,7 @@ class LinkShape:
 
 @dataclass(frozen=True, slots=True)
 class KinematicTree:
-    """All links of the bodies of a file, parents before their children, and what is modelled of them, link by link.
+    """All links of the bodies of a file, parents before their children, and their modelled shapes, link by link.
 
     `bodies` are the names of the bodies.
     """

@@ -1,4 +1,4 @@
-"""The shapes of all bodies side by side, for one pass of arithmetic per step."""
+"""The shapes of all bodies as arrays, for one pass of arithmetic per step."""
 
 from __future__ import annotations
 
@@ -13,35 +13,36 @@ from overlapper import Batch, Shape, _core
 from overlapper.shapes.table import facts
 from overlapper.simulation.model import BASE, Array, LinkKey, ModelledBody
 
-FARTHEST = 1e25  # m, beyond which the core measures nothing
+FARTHEST = 1e25  # m; the core measures nothing beyond
 
 Pose = Sequence[Sequence[float]]
 """Begins with a position in m and a quaternion xyzw."""
 
 
 class Poses(Protocol):
-    """The frames of some bases and links, which shapes are fixed to."""
+    """The frames of the bases and links that shapes are fixed to."""
 
     @property
     def colliders(self) -> Sequence[LinkKey]:
         """(body, link) of each frame, in the order of `read`."""
 
     def read(self) -> Sequence[Pose]:
-        """Where they are now."""
+        """The present frames."""
 
 
 class Layout:
     """The modelled shapes of `bodies`, parallel to `keys`, which are (body, link, shape), sorted.
 
-    `key_rows` (k, 3) are the same as an array, `shapes` and `batch` the shapes, `owners` (k,) their bodies, `colliders`
-    (k,) the places of their links in `collider_rows`, by (body, link). `of_several_colliders` are the bodies that have
-    shapes on more than their base. `positions` (k, 3) and `orientations` (k, 4) are where `pose` found them.
+    `key_rows` (k, 3) are the keys as an array. `shapes` and `batch` are the shapes, and `owners` (k,) are their bodies.
+    `colliders` (k,) are the rows of their links in `collider_rows`, which is by (body, link). `of_several_colliders`
+    are the bodies with shapes on links other than the base. `positions` (k, 3) and `orientations` (k, 4) are the poses
+    of the shapes at the last `pose`.
     """
 
     def __init__(
         self, bodies: Mapping[int, ModelledBody], poses: Callable[[Mapping[int, Sequence[int]]], Poses]
     ) -> None:
-        """`poses` makes what reads the frames of bodies and their links."""
+        """`poses` makes the reader of the frames of bodies and their links."""
         shaped = {id: body.shapes for id, body in bodies.items() if body.shapes or body.ground}
         modelled = [each for shapes in shaped.values() for each in shapes]
         self.keys = [(id, each.link, each.index) for id, shapes in shaped.items() for each in shapes]
@@ -63,16 +64,16 @@ class Layout:
         self.of_several_colliders = [id for id, each in links.items() if each]
 
     def frame(self, body: int) -> tuple[Array, Array]:
-        """Position (3,) and quaternion (4,) of a base, where `pose` found it."""
+        """Position (3,) and quaternion (4,) of a base at the last `pose`."""
         position, orientation = self._read[self._place[body, BASE]][:2]
         return np.array(position), np.array(orientation)
 
     def reach(self, rows: NDArray[np.intp]) -> Array:
-        """(n,) m: how far the shapes in these rows reach from their own origins; planes reach everywhere."""
+        """(n,) how far the shapes in these rows extend from their own origins, m; infinite for planes."""
         return np.array([_reach(self.shapes[row]) for row in rows])
 
     def pose(self) -> set[int]:
-        """Place the shapes where their colliders are now. Returns the bodies with a shape that has no usable pose."""
+        """Place the shapes by the present poses of their colliders. Returns the bodies with an unusable pose."""
         self._read = self.poses.read()
         self.positions, self.orientations = _core.world_poses(
             self._read, self._places, self._local_positions, self._local_orientations

@@ -1,4 +1,4 @@
-"""The overlaps of a simulation per pair of links: what the unions of their shapes share, every volume counted once."""
+"""The overlaps of a simulation per pair of links: what the unions of their shapes share. No volume is counted twice."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class LinkContact:
-    """Two links whose shapes overlap or touch. True only if they overlap.
+    """Two links whose shapes overlap or touch. Its truth value is True only if they overlap.
 
-    `bodyA`, `linkA`, `bodyB` and `linkB` are pybullet's indices, link -1 is the base. `overlap` is what the unions of
-    their shapes share, `contacts` are the pairs of their shapes, and `deepest` is the pair with the largest depth.
-    Where one pair of shapes overlaps, its depth and normal, from B to A, are those of the links. Otherwise they are a
-    lower bound of how far the links must be moved apart, and a first guess of where to.
+    `bodyA`, `linkA`, `bodyB` and `linkB` are pybullet's indices, link -1 is the base. `overlap` is the intersection of
+    the unions of their shapes. `contacts` are the pairs of their shapes, and `deepest` is the pair with the largest
+    depth. If only one pair of shapes overlaps, its depth and normal (from B to A) are those of the links. Otherwise
+    the depth is a lower bound of the distance that separates the links, and the normal is a first guess of the
+    direction.
     """
 
     bodyA: int
@@ -40,33 +41,33 @@ class LinkContact:
 
     @property
     def status(self) -> Literal["touching", "overlapping"]:
-        """Overlapping, if any pair of their shapes is."""
+        """The status: "overlapping" if any pair of their shapes overlaps, otherwise "touching"."""
         return "overlapping" if self else "touching"
 
     @property
     def volume(self) -> float:
-        """m³ that the union of the shapes of one link shares with that of the other; 0 unless overlapping."""
+        """The volume of the intersection of the two unions of shapes, m³; 0 unless overlapping."""
         return self.overlap.volume
 
     @property
     def volume_error(self) -> float:
-        """m³: the true volume is within volume ± volume_error."""
+        """The true volume is within volume ± volume_error, m³."""
         return self.overlap.volume_error
 
     @property
     def centroid(self) -> NDArray[np.float64] | None:
-        """(3,) of the common volume in the world, m; None unless overlapping."""
+        """(3,) centroid of the common volume in the world, m; None unless overlapping."""
         return self.overlap.centroid
 
     @property
     def gradient(self) -> NDArray[np.float64]:
         """(2, 6) d volume / d (translation, rotation vector) of A's link and of B's, m² and m³: about the point
-        `overlap.about`, world axes; zeros unless overlapping."""
+        `overlap.about`, in world axes; zeros unless overlapping."""
         return self.overlap.gradient
 
     @property
     def patch_area(self) -> NDArray[np.float64]:
-        """(3,) m², the area vector of what the union of A's shapes holds of the surface of B's, from B to A: as
+        """(3,) area vector of B's surface within A, for the unions of their shapes, m², from B to A: equal to
         gradient[1, :3]; zeros unless overlapping."""
         return self.gradient[1, :3]
 
@@ -77,20 +78,20 @@ class LinkContact:
 
     @property
     def depth(self) -> float:
-        """m, of the deepest pair of shapes."""
+        """The depth of the deepest pair of shapes, m."""
         return self.deepest.overlap.depth or 0.0
 
     @property
     def normal(self) -> NDArray[np.float64]:
-        """(3,) unit, from B to A, of the deepest pair of shapes."""
+        """(3,) unit normal of the deepest pair of shapes, from B to A."""
         normal = self.deepest.overlap.normal
         assert normal is not None
         return normal
 
 
 class LinkContacts(Tabular, list[LinkContact]):
-    """A list of them; `names` are those of the links, by (body, link). As a table, by `to_pandas()` and its like, they
-    have the columns of `overlapper run --links` but for its steps; the area is missing."""
+    """A list of `LinkContact`. `names` are those of the links, by (body, link). `to_pandas()` and similar methods make
+    tables with the columns of `overlapper run --links`, without steps. The area is missing."""
 
     __slots__ = ("names",)
 
@@ -99,7 +100,7 @@ class LinkContacts(Tabular, list[LinkContact]):
         self.names = names or {}
 
     def columns(self) -> Columns:
-        """The columns of the table by name, each an array or a list with a value for each row."""
+        """The columns of the table by name, each an array or a list with one value per row."""
         columns: Columns = {}
         for side, links in (
             ("A", [(pair.bodyA, pair.linkA) for pair in self]),
@@ -114,7 +115,7 @@ class LinkContacts(Tabular, list[LinkContact]):
 
 
 def link_contacts(contacts: Iterable[Contact]) -> LinkContacts:
-    """The contacts that `Bodies.overlaps` found, per pair of links, sorted by (bodyA, linkA, bodyB, linkB)."""
+    """The contacts of `Bodies.overlaps` per pair of links, sorted by (bodyA, linkA, bodyB, linkB)."""
     if not isinstance(contacts, Iterable):
         raise TypeError(f"contacts must be what Bodies.overlaps() returns, not {contacts!r}")
     ordered = sorted(contacts, key=lambda each: (_solids(each), _shapes(each)))

@@ -1,4 +1,4 @@
-"""The questions of volumetric contact to a simulator: masses and joints, velocities, and steps with forces."""
+"""The interface of a simulator for volumetric contact: masses and joints, velocities, and steps with forces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Dynamics(Protocol):
 
     @property
     def solver(self) -> ContactSolver:
-        """Knows masses and joints."""
+        """The solver, which knows masses and joints."""
 
     @property
     def links(self) -> Sequence[LinkKey]:
@@ -23,18 +23,18 @@ class Dynamics(Protocol):
 
     @property
     def place(self) -> Mapping[LinkKey, int]:
-        """The place of each in `links`."""
+        """The index of each link in `links`."""
 
     @property
     def friction(self) -> Array:
-        """(n,) the coefficient of each."""
+        """(n,) the coefficient of friction of each link."""
 
     def read(self) -> bool:
-        """Read masses and friction again; True if masses have changed, so that there is a new solver."""
+        """Read masses and friction again. True if masses have changed, so that there is a new solver."""
 
     @property
     def gravity(self) -> Array:
-        """The acceleration of all coordinates that is known before anything has moved."""
+        """The acceleration of all coordinates that is known before any motion."""
 
     def frames(self) -> Sequence[Pose]:
         """The inertial frames of `links`, now."""
@@ -43,15 +43,15 @@ class Dynamics(Protocol):
         """The velocities of all coordinates: of bases in m/s and rad/s, in the world, and of joints in rad/s or m/s."""
 
     def apply(self, wrenches: Array, frames: Sequence[Pose]) -> None:
-        """Let forces and torques (n, 6) act on `links` in the next step, about the origins of their `frames`."""
+        """Apply forces and torques (n, 6), about the origins of `frames`, to `links` in the next step."""
 
 
 class Mechanics(Protocol):
-    """A simulation whose own response to some pairs is off, and that forces are applied to instead."""
+    """A simulation in which forces replace the simulator's own response to some pairs."""
 
     @property
     def restored(self) -> int:
-        """How often the bodies were put back to a state that was saved."""
+        """How often a saved state of the bodies was restored."""
 
     def dynamics(self, bodies: Sequence[int]) -> Dynamics:
         """The masses and joints of these bodies."""
@@ -60,19 +60,19 @@ class Mechanics(Protocol):
         """Turn the simulator's own response to these pairs off. RuntimeError if the simulation is within another."""
 
     def turn_off(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
-        """Turn it off for these pairs, too."""
+        """Turn the response off for these pairs, too."""
 
     def leave(self) -> None:
-        """Leave the simulator as it was before `enter`."""
+        """Restore the simulator to its settings before `enter`."""
 
     def begin(self, length: float, duration: float, first: bool) -> None:
-        """Prepare a substep of `length` (s), the `first` or a later one, of a time step of that `duration` (s)."""
+        """Prepare a substep of `length` (s), the `first` or a later one, of a time step of `duration` (s)."""
 
     def step(self) -> None:
-        """Go on by the length begun, by the forces that `Dynamics.apply` was told."""
+        """Make the prepared substep, with the forces of `Dynamics.apply`."""
 
     def stepped(self, duration: float) -> None:
-        """A time step of that `duration` (s) is over, or was given up."""
+        """End a time step of `duration` (s), complete or given up."""
 
     def announce(self) -> None:
-        """Let whoever watches know of a step."""
+        """Report a step to all listeners."""

@@ -1,4 +1,4 @@
-"""A simulator's bodies as they are modelled: convex shapes in the frames of their links, and what is left out."""
+"""The modelled bodies of a simulator: convex shapes in the frames of their links, and the shapes left out."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ BASE = -1
 class Skipped:
     """Shapes of one link that are not modelled, and why.
 
-    `body` and `link` are pybullet's indices: link -1 is the base, body -1 one to which pybullet gives no id. `name` is
-    what the link is called, `reason` one sentence. `diverged` is True of a body that has no finite pose.
+    `body` and `link` are pybullet's indices: link -1 is the base, body -1 is a body to which pybullet gives no id.
+    `name` is the name of the link, `reason` is one sentence. `diverged` is True if the body has no finite pose.
     """
 
     body: int
@@ -38,11 +38,12 @@ class Skipped:
 
 @dataclass(frozen=True, slots=True)
 class Decomposed:
-    """A concave mesh of one link, modelled as the union of convex parts: the shapes `shapes` of it.
+    """A concave mesh of one link, modelled as the union of convex parts.
 
-    `body` and `link` are pybullet's indices, link -1 is the base; `name` is what the link is called.
-    `volume` (m³) is that of the parts together, `mesh_volume` what the mesh bounds; None where its surface is open or
-    turns both ways. `path` is where the parts are kept on disk, None if the mesh had them already and they are exact.
+    `body` and `link` are pybullet's indices, link -1 is the base. `name` is the name of the link. `shapes` are the
+    indices of the parts among the shapes of the link. `volume` (m³) is the volume of all parts. `mesh_volume` (m³) is
+    the volume that the mesh bounds, None if its surface is open or turns both ways. `path` is the file of the parts,
+    None if the mesh consisted of convex parts already and they are exact.
     """
 
     body: int
@@ -56,10 +57,10 @@ class Decomposed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf:
-    """One shape of a collider as a simulator has it, compounds resolved; lengths in metres.
+    """One shape of a collider in a simulator, with compounds resolved. Lengths are in metres.
 
     `position` (3,) and `orientation` (4,) xyzw place it in the collider's frame, the inertial frame of its link.
-    What `figures` holds depends on `kind`:
+    The content of `figures` depends on `kind`:
         box          (3,) half extents
         sphere       (1,) radius
         capsule      (2,) radius, length between the cap centres along local z
@@ -68,8 +69,8 @@ class Leaf:
         hull         (n, 3) points
         concave mesh (t, 3, 3) corners of the triangles
         multisphere  (n, 4) centres and radii of the spheres whose convex hull it is
-    and is empty for every other kind ("height field", "capsule along x", ...). `margin` is the collision margin that
-    the simulator lays around a hull.
+    `figures` is empty for every other kind ("height field", "capsule along x", ...). `margin` is the collision margin
+    that the simulator lays around a hull.
     """
 
     kind: str
@@ -104,9 +105,9 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class ModelledBody:
-    """A body: `link_names`, `colors` and `parents` by link, and how many shapes it has, modelled or not.
+    """A body: `link_names`, `colors` and `parents` by link. `shape_count` is its number of shapes, modelled or not.
 
-    If it is a height field, its `ground`, `shapes` are the prisms of it that are modelled so far.
+    The `ground` of a body is its height field. `shapes` are then the prisms of the ground that are modelled so far.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The shapes of a link as convex ones: what each is modelled as, or why it is not."""
+"""The shapes of a link as convex shapes, or the reasons why they are not modelled."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from overlapper.simulation.settings import Modelling
 def modelled(
     link: int, leaves: tuple[Leaf, ...], modelling: Modelling
 ) -> tuple[list[ModelledShape], list[str], list[tuple[range, Decomposition]]]:
-    """The leaves of a link as shapes, a reason for each that has none, and which shapes are parts of a concave mesh."""
+    """The leaves of a link as shapes, reasons for leaves without shapes, and the ranges of parts of concave meshes."""
     made: list[ModelledShape] = []
     reasons: list[str] = []
     meshes: list[tuple[range, Decomposition]] = []
@@ -45,7 +45,7 @@ def modelled(
 
 
 def _solid(data: bytes, modelling: Modelling) -> Decomposition:
-    """A concave mesh as convex parts. NotDecomposed says why there are none."""
+    """A concave mesh as convex parts. NotDecomposed gives the reason of a failure."""
     if modelling.concave == "skip":
         raise NotDecomposed("a concave mesh is left out, as concave='skip' asks")
     found = _decomposition(data, modelling.concave == "enclose", modelling.concave_threshold)
@@ -56,7 +56,7 @@ def _solid(data: bytes, modelling: Modelling) -> Decomposition:
 
 @lru_cache(maxsize=64)
 def _decomposition(data: bytes, enclose: bool, threshold: float) -> Decomposition | NotDecomposed:
-    """The decomposition of a mesh that many bodies may have. A failure is kept, too: it may have taken minutes."""
+    """The cached decomposition of a mesh. A failure is cached, too, as it may have taken minutes."""
     try:
         return decompose(np.frombuffer(data).reshape(-1, 3, 3), threshold, enclose)
     except NotDecomposed as error:
@@ -64,7 +64,7 @@ def _decomposition(data: bytes, enclose: bool, threshold: float) -> Decompositio
 
 
 def _capsule(leaf: Leaf) -> Leaf:
-    """The capsule that a multi-sphere of two equal spheres is; any other multi-sphere as it came."""
+    """A multi-sphere of two equal spheres as a capsule. Any other multi-sphere is unchanged."""
     centres, radii = leaf.figures[:, :3], leaf.figures[:, 3]
     if len(radii) != 2 or radii[0] != radii[1]:
         return leaf
@@ -81,7 +81,7 @@ def _capsule(leaf: Leaf) -> Leaf:
 
 @lru_cache(maxsize=1024)
 def _shape(kind: str, data: bytes, margin: float) -> Shape:
-    """The shape with these figures of a leaf; equal ones are one object. ValueError says why there is none."""
+    """The shape with these figures of a leaf. Equal shapes are one object. ValueError gives the reason of a failure."""
     figures = np.frombuffer(data)
     match kind:
         case "box":

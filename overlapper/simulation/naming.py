@@ -1,4 +1,4 @@
-"""Names of bodies as a person would call them: by file, by the name of a robot, or by mesh or kind of shape."""
+"""Readable names of bodies: by file, by the name of a robot, or by mesh or kind of shape."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from overlapper.simulation.model import LinkKey, ModelledBody
 
 ENDINGS = (".urdf", ".sdf", ".xml", ".obj", ".stl", ".dae")
 
-# Words that many robots, files and meshes bear, and that tell none from another: exporters and templates write them.
+# Words in names of many robots, files and meshes, written by exporters and templates. They do not identify a body.
 EMPTY = {"base", "body", "collision", "cube", "description", "dump", "dumpurdf", "link", "main", "mesh", "model", "obj"}
 EMPTY |= {"object", "part", "physics", "robot", "scene", "sdf", "untitled", "urdf", "visual", "world", "xml"}
-IN_FILE_NAMES = EMPTY - {"cube"}  # robots are called so by whoever copied one, files only if they are of one
-# Words that are left out at the end of a name: duck_vhacd is a duck.
+IN_FILE_NAMES = EMPTY - {"cube"}  # many copied robots are called "cube"; a file is called so only if it has a cube
+# Words that are left out at the end of a name: duck_vhacd becomes duck.
 OF_TOOLS = {"coacd", "description", "textured", "urdf", "vhacd"}
 
 
 def body_name(own: str, file: str | None, alone: bool, meshes: Sequence[str], kind: str | None) -> str:
-    """The name that says most, or an empty one.
+    """The most informative name of a body, or an empty one.
 
-    `own` is what the simulator calls it, `file` what it was loaded from, `alone` or with others. `meshes` are the files
-    of a body of one link, and `kind` is what its only shape is.
+    `own` is the simulator's name of the body. `file` is the file that it was loaded from, `alone` or with others.
+    `meshes` are the mesh files of a body of one link. `kind` is the kind of its only shape.
     """
     stem, folder = (PurePath(file).stem, PurePath(file).parent.name) if file else ("", "")
     named_after_a_file = own.lower().endswith(ENDINGS)
     plain = PurePath(own.replace("\\", "/")).stem if named_after_a_file else own
     of_file = [name for name in (stem, folder) if _says_something(name, IN_FILE_NAMES)]
-    # The bodies of one file are told apart by nothing but their own names.
+    # Bodies of the same file differ only in their own names.
     own_says = _says_something(plain, EMPTY) and not (named_after_a_file and alone)
     candidates = [plain] if own_says else []
     if alone and of_file[:1] == [stem]:
@@ -44,7 +44,7 @@ def body_name(own: str, file: str | None, alone: bool, meshes: Sequence[str], ki
 
 
 def _says_something(name: str, empty: set[str]) -> bool:
-    """Whether there is a word that is not empty; a model is a model, of whatever kind."""
+    """Whether the name has a word that is not in `empty`, and does not begin with "model"."""
     words = [word.strip("0123456789") or word for word in re.findall(r"[^\W_]+", name.lower())]
     said = [word for word in words if word not in empty and len(word) > 1 and not word.isdigit()]
     return bool(said) and words[0] != "model"
@@ -58,7 +58,7 @@ def _without_words_of_tools(name: str) -> str:
 
 
 def named(names: Mapping[int, str] | None) -> dict[int, str]:
-    """The names given to bodies by their numbers, fit to be seen. ValueError for an invalid name."""
+    """The names given to bodies by their numbers, made printable. ValueError for an invalid name."""
     wanted = "names must have names by the numbers of bodies, such as {3: 'duck'}, not "
     if not isinstance(names or {}, Mapping):
         raise ValueError(f"{wanted}{names!r}")
@@ -69,12 +69,12 @@ def named(names: Mapping[int, str] | None) -> dict[int, str]:
 
 
 def labels(bodies: Mapping[int, ModelledBody]) -> dict[int, str]:
-    """The names of bodies; those that several would share end in "#" and the number of the body."""
+    """The names of bodies. Names that are not unique end in "#" and the number of the body."""
     return _distinct({id: body.name for id, body in bodies.items()})
 
 
 def link_names(bodies: Mapping[int, ModelledBody]) -> dict[LinkKey, str]:
-    """Label and name of each link; those that several links would share end in "#" and the number of the link."""
+    """Label and name of each link. Names that are not unique in a body end in "#" and the number of the link."""
     return {
         (id, link): f"{label}/{name}" if name else label
         for id, label in labels(bodies).items()

@@ -1,4 +1,4 @@
-"""How little of a scene had to be modelled."""
+"""How much of a scene was modelled and measured."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """How little of a scene had to be modelled.
+    """How much of a scene was modelled and measured.
 
-    `bodies` and `shapes` count those of the scene, `shapes_read` those modelled. The rest is of the last `overlaps()`.
-    `pairs_possible` are the pairs of modelled shapes that it was asked about, by default those that the simulator lets
-    collide. `pairs_examined` are those whose boxes meet, and `pairs_overlapping` those that overlap. `pairs_widened`
-    were measured again in wider arithmetic (see `Overlap.widened`). `facets_touched` took part, and `planes_asked` were
-    asked for (see `Overlaps.planes_asked`).
+    `bodies` and `shapes` are the numbers in the scene, and `shapes_read` is the number of modelled shapes. The other
+    numbers are those of the last `overlaps()`. `pairs_possible` counts the chosen pairs of modelled shapes, by default
+    those that the simulator lets collide. `pairs_examined` counts the pairs whose boxes meet, and `pairs_overlapping`
+    the pairs that overlap. `pairs_widened` were measured again in wider arithmetic (see `Overlap.widened`).
+    `facets_touched` took part, and `planes_asked` were asked for (see `Overlaps.planes_asked`).
 
-    `pairs_within_margins` are the pairs of links asked about that have contact points in pybullet and no overlap. The
-    margins that Bullet lays around hulls hold them apart. With surface="margin" there are none: the margins are then
-    part of the shapes, and such pairs overlap.
+    `pairs_within_margins` counts the chosen pairs of links that have contact points in pybullet but no overlap. The
+    margins that Bullet lays around hulls keep these links apart. With surface="margin" the number is 0: the margins are
+    part of the shapes, so such pairs overlap.
     """
 
     bodies: int

@@ -1,4 +1,4 @@
-"""How bodies are modelled and how their overlaps are asked for: the settings that runs, tables and sweeps have."""
+"""The settings of runs, tables and sweeps: how bodies are modelled, and which pairs are measured and how."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Method = Literal["auto", "paper"]
 
 @dataclass(frozen=True, slots=True)
 class Modelling:
-    """How shapes are modelled, as `simulation.Bodies` describes it. ValueError for an invalid choice."""
+    """How shapes are modelled: see `simulation.Bodies`. ValueError for an invalid choice."""
 
     concave: Concave = "decompose"
     concave_threshold: float = 0.05
@@ -33,9 +33,9 @@ class Modelling:
 
 @dataclass(frozen=True, slots=True)
 class Asking:
-    """Which pairs are measured, and how, as `simulation.Bodies.overlaps` describes it. ValueError for an invalid value.
+    """Which pairs are measured, and how: see `simulation.Bodies.overlaps`. ValueError for an invalid value.
 
-    Without `pairs`, a scene says which pairs.
+    If `pairs` is None, the scene chooses the pairs.
     """
 
     pairs: Among | None = None
@@ -61,12 +61,12 @@ Settings = TypeVar("Settings", Modelling, Asking)
 
 
 def settings_of(*values: Modelling | Asking) -> dict[str, Any]:
-    """The settings by name, as keyword arguments and the headings of tables have them."""
+    """The settings by name, for keyword arguments and headings of tables."""
     return {each.name: getattr(value, each.name) for value in values for each in fields(value)}
 
 
 def read_settings(kind: type[Settings], heading: Mapping[str, str]) -> Settings:
-    """The settings that the heading of a table has; the others are as by default. ValueError for an invalid one."""
+    """The settings in the heading of a table. Missing ones have their defaults. ValueError for an invalid one."""
     told = {
         each.name: float(heading[each.name]) if isinstance(each.default, float) else heading[each.name]
         for each in fields(kind)

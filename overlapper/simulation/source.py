@@ -1,4 +1,4 @@
-"""The questions of `AnyBodies` to a simulator: which bodies, what is new, where they are, and who may collide."""
+"""The interface of a simulator for `AnyBodies`: bodies, changes, poses, and which links may collide."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from overlapper.simulation.model import ModelledBody, Skipped
 
 
 class Unreadable(RuntimeError):
-    """A simulator cannot hand over its shapes; the text is one sentence."""
+    """A simulator cannot hand over its shapes. The text is one sentence."""
 
 
 class Source(Protocol):
-    """A simulator's answers. A class that inherits from `Source` has the plain answers, where there are any."""
+    """A simulator's answers. Subclasses of `Source` inherit the default answers, where there are any."""
 
     engine: str = ""
-    """The name in ENGINES of the engine that simulates; empty if it is none of these."""
+    """The name of the engine in ENGINES; empty if it is not there."""
 
     contact: type[Contact] = Contact
-    """The class of two shapes that overlap or touch."""
+    """The class of contacts: two shapes that overlap or touch."""
 
     bodies: dict[int, ModelledBody]
-    """The bodies by number, sorted. `AnyBodies` replaces those of height fields as it models more of the ground."""
+    """The bodies by number, sorted. `AnyBodies` replaces a height field when it models another part of the ground."""
 
     @property
     def time_step(self) -> float:
-        """s that a step takes."""
+        """The time step, s."""
 
     def refresh(self) -> Sequence[Skipped] | None:
-        """Read what is new. None if no body has come or gone, otherwise what is newly skipped.
+        """Read new bodies. None if no body has come or gone, otherwise the newly skipped shapes.
 
         ValueError if the simulation has ended.
         """
@@ -45,16 +45,16 @@ class Source(Protocol):
         """The reader of the frames of these bodies' bases, and of their `links`."""
 
     def rules(self, layout: Layout) -> Rules:
-        """The rules in force; the same object as long as they and the layout are the same."""
+        """The rules in force. The object stays the same as long as the rules and the layout do."""
 
     @property
     def settings(self) -> Mapping[str, str | float]:
-        """How the bodies were read, for the headings of tables."""
+        """The settings with which the bodies were read, for the headings of tables."""
         return {}
 
     @property
     def unidentified(self) -> int:
-        """How many shapes belong to none of `bodies`."""
+        """The number of shapes that belong to none of `bodies`."""
         return 0
 
     @property
@@ -63,17 +63,17 @@ class Source(Protocol):
         return ()
 
     def cautions(self, layout: Layout) -> Iterable[Warning]:
-        """Warnings before the pairs are measured that the simulator lets collide."""
+        """Warnings to give before measuring the pairs that the simulator lets collide."""
         return ()
 
     def within_margins(self, found: Contacts, layout: Layout, chosen: Callable[[NDArray[np.int32]], Mask]) -> int:
-        """How many pairs of links the simulator takes for touching, among those `chosen`, that are not in `found`."""
+        """The number of `chosen` pairs of links that touch in the simulator but are not in `found`."""
         return 0
 
     def mechanics(self) -> Mechanics:
-        """The simulation as forces are applied to it. ValueError if the simulator takes no forces."""
+        """The interface that applies forces. ValueError if the simulator takes no forces."""
         raise ValueError("this simulator takes no forces, so there is no volumetric contact in it")
 
     def close(self) -> None:
-        """Nothing more will be asked."""
+        """End the reading: no other method is called afterwards."""
         return

@@ -1,1 +1,1 @@
-"""One scene run with many parameters, on many processes or machines; nothing is lost when something dies."""
+"""One scene run with many parameters, on many processes or machines. No result is lost when a process dies."""

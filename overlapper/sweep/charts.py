@@ -1,4 +1,4 @@
-"""The results of a sweep over its parameters: lines and heat maps, as SVG to stand in a page."""
+"""Charts of the results of a sweep over its parameters: lines and heat maps, as SVG for a page."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from overlapper.install import hint
 
 Values = NDArray[np.float64]
 
-# Values of a parameter that are told apart; more of them, as of a sample, are put into so many bins.
+# The most values of a parameter that are drawn separately. More values, as in a sample, are put into this many bins.
 APART = 24
 BINS = 12
 
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """A column to draw, with what it is called and a factor to its unit."""
+    """A column to draw, with its label and the factor to its unit."""
 
     column: str
     label: str
@@ -42,7 +42,7 @@ FORCE = Measure("largest_force_n", "largest force, N", 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """A parameter: the tasks' values put into groups, each with its middle and its edges."""
+    """A parameter: the values of the tasks in groups, each with its middle and its edges."""
 
     name: str
     group: NDArray[np.intp]
@@ -60,7 +60,7 @@ def axis(name: str, values: Sequence[Any] | NDArray[Any]) -> Axis:
         middles = np.arange(len(kinds), dtype=float)
         return Axis(name, group, middles, _edges(middles), list(map(str, kinds)))
     found = values.astype(float)
-    # Ten times from the least to the largest, in steps that grow: this was meant by factors.
+    # The axis is logarithmic if the largest value is ten times the least or more.
     log = bool(found.min() > 0 and found.max() >= 10 * found.min() and values.dtype.kind == "f")
     scaled = np.log(found) if log else found
     middles = np.unique(scaled)
@@ -80,7 +80,7 @@ def _edges(middles: Values) -> Values:
 
 
 def lines(across: Axis, measured: Sequence[tuple[Measure, Values]], middle: Callable[[Values], Any] = np.median) -> str:
-    """Each measure over a parameter: the middle of the tasks with a value, and the band that holds all of them."""
+    """Each measure over a parameter: the `middle` of the tasks at each value, and the band that holds all of them."""
     figure = _figure(3.1 * len(measured), 2.5)
     for axes, (measure, values) in zip(np.atleast_1d(figure.subplots(1, len(measured))), measured):
         groups = [values[across.group == k] * measure.factor for k in range(len(across.middles))]
@@ -98,7 +98,7 @@ def lines(across: Axis, measured: Sequence[tuple[Measure, Values]], middle: Call
 def heat_map(
     across: Axis, up: Axis, measured: Sequence[tuple[Measure, Values]], middle: Callable[[Values], Any] = np.median
 ) -> str:
-    """The middle of each measure for each pair of values of two parameters; what no task has is left white."""
+    """The middle of each measure for each pair of values of two parameters. Pairs without a task stay white."""
     cell = up.group * len(across.middles) + across.group
     order = np.argsort(cell, kind="stable")
     places, begins = np.unique(cell[order], return_index=True)

@@ -1,6 +1,6 @@
-"""A sweep held against a recorded one: which tasks came to something else, and by how many times their budgets.
+"""Compares a sweep with a recorded one: which tasks have other results, and by how many times their budgets.
 
-Both are read part by part. Of each task a few numbers stay in memory.
+Both sweeps are read part by part. Only a few numbers of each task stay in memory.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from overlapper.verdicts.expected import FORCES, ROUNDING, Budget, budgets_in
 Values = NDArray[np.float64]
 Block = Mapping[str, NDArray[Any]]
 
-# The measures compared, each with the quantity whose budget holds for it.
+# The compared measures, each with the quantity whose budget applies.
 BUDGETED = {"largest_volume_m3": "volume", "mean_volume_m3": "volume", "largest_depth_m": "depth"}
-BUDGETED |= {"largest_force_n": "force"}  # of volumetric contact alone
+BUDGETED |= {"largest_force_n": "force"}  # only with volumetric contact
 FORCE, CONTACT, TASK_ITSELF = "mean_force_m2", "contact_time_s", "task"
-COUNTED = ("skipped", "diverged")  # any difference is one; earlier versions did not count
+COUNTED = ("skipped", "diverged")  # any difference counts as a move; earlier versions did not write these columns
 COMPARED = (TASK_ITSELF, *COUNTED, *BUDGETED, FORCE, CONTACT)
 
 DRAWN = ("largest_volume_m3", "largest_depth_m")  # the measures whose differences are kept for each task
@@ -50,9 +50,9 @@ BLOCK = 50_000  # tasks that are compared at a time
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A measure of a task that is too far from what was recorded: by `part` times what is allowed.
+    """A measure of a task that is too far from its recorded value: by `part` times the allowed difference.
 
-    A task itself, done or failed, is a measure without such a number, which is then infinite.
+    Whether the task is done or failed is also a measure. It has no number, and its `part` is infinite.
     """
 
     parameters: Mapping[str, Parameter]
@@ -71,11 +71,11 @@ class Change:
 class Comparison:
     """The tasks that both sweeps have.
 
-    `numbers` are those of the tasks in the sweep, and `parts` how many times its budget the worst measure of each has
-    moved; above 1, the task has moved. `differences` say how much more of some measures each task has than recorded,
-    not a number where the task failed. `counts` says in how many tasks each measure has moved. `worst` has the worst
-    change of the worst tasks, `same_failures` counts the tasks that failed as they had when they were recorded, and
-    `added` and `gone` are numbers of tasks that only this or the other sweep has.
+    `numbers` are the numbers of these tasks in this sweep. `parts` says for each task how many times its budget the
+    worst measure has moved; above 1, the task has moved. `differences` are the values of some measures minus the
+    recorded values; NaN where the task failed. `counts` says in how many tasks each measure has moved. `worst` has the
+    worst change of each of the worst tasks. `same_failures` counts the tasks that failed in the same way as recorded.
+    `added` counts the tasks that only this sweep has, `gone` the tasks that only the recorded sweep has.
     """
 
     folder: Path
@@ -90,12 +90,12 @@ class Comparison:
 
     @property
     def moved(self) -> Numbers:
-        """The numbers of the tasks that have moved, the worst first."""
+        """The numbers of the tasks that have moved, the worst task first."""
         order = np.argsort(-self.parts, kind="stable")
         return self.numbers[order][: int((self.parts > 1).sum())]
 
     def lines(self, limit: int) -> list[str]:
-        """How many tasks have moved, and the `limit` worst ones, each with its worst measure."""
+        """Sentences: how many tasks have moved, and the `limit` worst tasks, each with its worst measure."""
         moved, compared = int((self.parts > 1).sum()), len(self.numbers)
         by_measure = ", ".join(f"{name} in {count:,}" for name, count in self.counts.items())
         said = f"{moved:,} of {compared:,} tasks have moved since {self.folder}: {by_measure}."
@@ -112,8 +112,8 @@ class Comparison:
 class _Side:
     """The tasks of one of the two sweeps, by their numbers in the sweep that is compared.
 
-    `read` gives some columns of a file, and `numbers` the number of each of its rows, -1 for other tasks; it takes the
-    columns `told`. `place` (n,) says in which of `files` each task is, -1 for none.
+    `read` returns some columns of a file. `numbers` takes the columns `told` and returns the task number of each row,
+    -1 for tasks that the sweep does not have. `place` (n,) says in which of `files` each task is, -1 for none.
     """
 
     files: Sequence[Path]
@@ -123,9 +123,9 @@ class _Side:
     place: NDArray[np.int32]
 
     def block(self, wanted: Numbers) -> Block:
-        """The columns of some tasks, whose numbers are in order; `what` is "done" or how the task failed.
+        """The columns of some tasks, whose numbers are in order. `what` is "done" or how the task failed.
 
-        All others are numbers, and not a number for a task that failed. Optional columns may not be there.
+        All other columns are numbers; they are NaN for a task that failed. Optional columns may be missing.
         """
         found: dict[str, NDArray[Any]] = {name: np.full(len(wanted), np.nan) for name in (*NEEDED, *OPTIONAL)}
         found[WHAT] = np.full(len(wanted), DONE, object)
@@ -144,7 +144,7 @@ class _Side:
 
 
 def _places(count: int, numbers: Iterable[Numbers]) -> NDArray[np.int32]:
-    """In which part each of so many tasks is, by the numbers in each part; of several parts, the last."""
+    """For each of `count` tasks, the part that holds it, from the numbers in each part; the last one if several do."""
     place = np.full(count, -1, np.int32)
     for part, found in enumerate(numbers):
         place[found[found >= 0]] = part
@@ -154,16 +154,16 @@ def _places(count: int, numbers: Iterable[Numbers]) -> NDArray[np.int32]:
 class Recorded:
     """The tasks in the folder of another sweep, whatever its scene file, settings and versions were.
 
-    Two tasks are the same if the parameters that both sweeps have are, to 12 digits. Budgets are those of the expected
-    file at `expected`, or, of what it does not name or where there is none, those of rounding. ValueError if either
-    cannot be read, or if no task of `sweep` is in the folder.
+    Two tasks are the same if the parameters that both sweeps have are equal to 12 digits. Budgets come from the
+    expected file at `expected`. Without this file, and for quantities that it does not name, they are the budgets of
+    rounding. ValueError if the folder or the file cannot be read, or if no task of `sweep` is in the folder.
     """
 
     def __init__(self, folder: Path, expected: Path, sweep: Sweep) -> None:
         self._folder, self._sweep = folder, sweep
         budgets = budgets_in(read_metadata(expected), expected) if expected.is_file() else {}
         self._budgets: Mapping[str, Budget] = ROUNDING | FORCES | budgets
-        # Failures first: a task that is there both as failed and as done is done.
+        # Failures first: a task that is recorded both as failed and as done counts as done.
         tables = [folder / f"{table}.parquet" for table in (FAILURES, TASKS)]
         files = [path for table in tables for path in sorted(table.glob("*.parquet"))]
         if not files:
@@ -181,7 +181,7 @@ class Recorded:
         self._recorded = _Side(files, self._read, told, self._numbers, place)
 
     def _counted(self, files: Iterable[Path], told: Sequence[str]) -> Iterator[Any]:
-        """The rows of each part. At the end, the number of tasks is known. ValueError if two of them are the same."""
+        """The rows of each part. At the end, the number of tasks is known. ValueError if two tasks are the same."""
         tasks, keys = [], []
         for path in files:
             yield (rows := self._read(path, told))
@@ -192,13 +192,13 @@ class Recorded:
         self._must_differ(np.sort(np.concatenate(keys)[first]), "the sweep in it")
 
     def _must_differ(self, keys: Names, whose: str) -> None:
-        """ValueError if two of some sorted keys are the same."""
+        """ValueError if two of the sorted keys are equal."""
         if (keys[1:] == keys[:-1]).any():
             same = f"the same {', '.join(self._names)}" if self._names else "nothing to tell them apart"
             raise ValueError(f"--check {self._folder}: by the parameters of both, tasks of {whose} have {same}")
 
     def _columns(self, path: Path) -> set[str]:
-        """The columns of a part. ValueError if one is missing that is compared."""
+        """The columns of a part. ValueError if a column that is compared is missing."""
         columns = {*self._opened(path).schema_arrow.names}
         if missing := {TASK, *OF[path.parent.stem]} - LEFT_OUT.keys() - columns:
             raise ValueError(f"--check {self._folder}: {path.parent.name} has no column {min(missing)!r}")
@@ -212,7 +212,7 @@ class Recorded:
             raise self._unreadable(path, error) from error
 
     def _read(self, path: Path, columns: Sequence[str]) -> Any:
-        """Those columns of a part that are there."""
+        """The given columns of a part, without those that it does not have."""
         with self._opened(path) as file:
             try:
                 return file.read(columns=[*columns], use_threads=False)  # see store.content
@@ -227,13 +227,13 @@ class Recorded:
         return np.fromiter((_key(point) for point in points), "S16", len(rows))
 
     def _numbers(self, rows: Any) -> Numbers:
-        """The number in our sweep of each row of a part; -1 for tasks that it does not have."""
+        """The number in this sweep of each row of a part; -1 for tasks that this sweep does not have."""
         keys = self._keys_of(rows)
         at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
         return np.where(self._keys[at] == keys, self._order[at], -1)
 
     def compare(self, store: Store) -> Comparison:
-        """The comparison of the tasks that both sweeps have, as far as the sweep has come in its store."""
+        """The comparison of the tasks that both sweeps have. Only tasks that are already in the store are compared."""
         sweep, recorded = self._sweep, self._recorded
 
         def numbers(rows: Any) -> Numbers:
@@ -262,7 +262,7 @@ class _Tally:
         self._same_failures = 0
 
     def add(self, numbers: Numbers, was: Block, now: Block, budgets: Mapping[str, Budget]) -> None:
-        """Take in a block of tasks, as they were and as they are."""
+        """Add a block of tasks, as they were recorded and as they are now."""
         changed = was[WHAT] != now[WHAT]
         done = ~changed & (now[WHAT] == DONE)
         self._same_failures += int((~changed & (now[WHAT] != DONE)).sum())
@@ -287,7 +287,7 @@ class _Tally:
         self._worst = sorted(self._worst, key=itemgetter(0, 1))[:WORST]
 
     def comparison(self, folder: Path, numbers: Numbers, added: int, gone: int) -> Comparison:
-        """The comparison of all tasks that were taken in, which have these numbers."""
+        """The comparison of all tasks that were added; `numbers` are their numbers."""
         return Comparison(
             folder,
             numbers,
@@ -302,43 +302,43 @@ class _Tally:
 
 
 def _measured(was: Block, now: Block, budgets: Mapping[str, Budget]) -> Iterator[tuple[str, Values, Values, Values]]:
-    """Each measure with what it was and is, and the part of its budget that the difference takes."""
+    """Each measure with its recorded and its present values, and the part of its budget that the difference uses."""
     for measure in (*COUNTED, *BUDGETED):
         if measure in was and measure in now:
             budget = budgets[BUDGETED[measure]] if measure in BUDGETED else Budget(0.0, 0.0)
             a, b = was[measure], now[measure]
             yield measure, a, b, _part(_off_by(a, b), budget.absolute + budget.relative * abs(a))
-    # Forces that cancel leave the rounding of all the surface that they are of, which is not less than this.
+    # Forces that cancel leave the rounding error of the whole surface they act on. The surface is not less than this.
     surface, area = was["largest_volume_m3"] ** (2 / 3), budgets["area"]
     forces = [np.stack([block[name] for name in PUSHED]) for block in (was, now)]
     a, b, change = (np.linalg.norm(each, axis=0) for each in (*forces, forces[1] - forces[0]))
     yield FORCE, a, b, _part(change, area.absolute + area.relative * np.maximum(a, surface))
-    # It is a number of steps, and times are sums: half of one is none.
+    # Contact time is a whole number of steps, summed with rounding. A difference below half a step is none.
     a, b = was[CONTACT], now[CONTACT]
     yield CONTACT, a, b, _part(_off_by(a, b), was["time_s"] / was["steps"] / 2)
 
 
 def _off_by(was: NDArray[Any], now: NDArray[Any]) -> NDArray[Any]:
-    """The change of a measure. Not-a-number differs from every number, and not from itself."""
+    """The change of a measure. NaN differs from every number, but not from NaN."""
     return np.where((was == now) | (np.isnan(was) & np.isnan(now)), 0.0, abs(now - was))
 
 
 def _part(difference: NDArray[Any], allowed: NDArray[Any]) -> Values:
-    """The part of what is allowed that a difference takes; infinite if it is not a number."""
+    """The difference divided by the allowed difference; infinite if the difference is NaN."""
     part = np.where(difference == 0, 0.0, difference / allowed)
     return np.where(np.isnan(part), np.inf, part)
 
 
 def _key(values: Iterable[Parameter]) -> bytes:
-    """A digest of parameters, 16 bytes, by which tasks are told apart."""
+    """A digest of parameters, 16 bytes, that identifies a task."""
     return hashlib.sha256("\0".join(map(_to_12_digits, values)).encode()).digest()[:16]
 
 
 @lru_cache(maxsize=4096)
 def _to_12_digits(value: Parameter) -> str:
-    """A text of a parameter, the same for equal ones.
+    """A text of a parameter, the same for equal parameters.
 
-    Another version of NumPy may have another last digit in a grid of equal factors.
+    Another version of NumPy may give another last digit in a grid with equal factors, so only 12 digits count.
     """
     if isinstance(value, str):
         return repr(value)

@@ -1,4 +1,4 @@
-"""The tasks of a sweep that are done, and in which something was not looked at."""
+"""The finished tasks of a sweep in which shapes or bodies were left out."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from overlapper.sweep.sweep import Sweep
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """Counts the tasks with shapes that were not modelled and those with a body that had no finite pose.
+    """Counts the tasks with shapes that were not modelled, and the tasks with a body that had no finite pose.
 
-    Of each kind, the first is described.
+    The first task of each kind is described.
     """
 
     tasks: int
@@ -26,7 +26,7 @@ class LeftOut:
 
     @classmethod
     def of(cls, sweep: Sweep, store: Store) -> LeftOut:
-        """Those of a sweep."""
+        """The counts for a sweep."""
         numbers, columns = store.columns(TASKS, sweep, ["skipped", "diverged"])
         told: dict[str, int | str] = {}
         for kind, counts in columns.items():
@@ -42,7 +42,7 @@ class LeftOut:
         return bool(self.skipped or self.diverged)
 
     def lines(self) -> Iterator[str]:
-        """A sentence for each kind, if there is any."""
+        """A sentence for each kind of which there is a task."""
         if self.diverged:
             counted = f"{self.diverged:,} of {self.tasks:,} tasks have diverged"
             yield f"{counted}: a body had no finite pose, and was left out. The first is {self.first_diverged}."

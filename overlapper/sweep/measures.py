@@ -1,4 +1,4 @@
-"""The measures of a task: one row of the figures that people plot."""
+"""The measures of a task: one row of numbers to plot."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from overlapper.tables.frame import Frame
     from overlapper.tables.table import Value
 
-# How many links have shapes that were left out in any step, and how many bodies had no finite pose, each with the name
-# of the first; the step of the first body without a finite pose.
+# The number of links with shapes that were left out in any step, and the number of bodies that had no finite pose, each
+# with the name of the first; and the step at which the first body had no finite pose.
 LEFT_OUT: dict[str, type] = {
     "skipped": int,
     "first_skipped": str,
@@ -26,8 +26,8 @@ LEFT_OUT: dict[str, type] = {
     "diverged_step": int,
 }
 
-# Every measure, in order, with its type; the unit is in the name. The columns of the worst pair, that of the largest
-# volume, and of the deepest are empty if nothing overlaps.
+# The measures, in order, with their types; the unit is in the name. The worst pair is the pair with the largest volume.
+# The columns of the worst pair and of the deepest pair are empty if nothing overlaps.
 MEASURES: dict[str, type] = {
     "steps": int,
     "time_s": float,
@@ -53,20 +53,21 @@ FORCES: dict[str, type] = {"largest_force_n": float, "hardest_step": int, "harde
 
 @dataclass(slots=True)
 class _Pair(PairSummary):
-    """Two links so far, with the sum of their wrenches."""
+    """The summary of two links up to the current step, with the sum of their wrenches."""
 
     wrench: NDArray[np.float64] = field(default_factory=lambda: np.zeros(6))
 
     def add(self, step: int, pair: LinkContact, force: float = 0.0) -> None:
-        PairSummary.add(self, step, pair, force)  # super() does not know a dataclass with slots
+        PairSummary.add(self, step, pair, force)  # super() does not work in a dataclass with slots
         self.wrench += unit_wrench(pair)
 
 
 def unit_wrench(pair: LinkContact) -> NDArray[np.float64]:
-    """(6,) force and torque on the first of two overlapping links if pushing them into each other took a joule per m³.
+    """(6,) force and torque on the first of two overlapping links at an energy of one joule per m³ of common volume.
 
-    That is one pascal on the surface of the second within the first. The force, in N/Pa = m², is the area of what is
-    pushed, as a vector from the second to the first. The torque, in Nm/Pa = m³, is about the origin of the world.
+    This equals a pressure of one pascal on the second link's surface within the first. The force, in N/Pa = m², is
+    the vector area of this surface, from the second to the first. The torque, in Nm/Pa = m³, is about the origin of the
+    world.
     """
     about = pair.overlap.about
     assert about is not None
@@ -76,7 +77,7 @@ def unit_wrench(pair: LinkContact) -> NDArray[np.float64]:
 
 
 class Measures:
-    """The frames of a run, taken in one by one. Volumes are of links as a whole, as in the summary of a run."""
+    """Measures the frames of a run one by one. Volumes are of whole links, as in the summary of a run."""
 
     def __init__(self) -> None:
         self._steps, self._time, self._contact = 0, 0.0, 0.0
@@ -85,7 +86,7 @@ class Measures:
         self._left_out: dict[Skipped, int] = {}
 
     def add(self, frame: Frame[Any]) -> None:
-        """Take in the next step."""
+        """Add the next step."""
         passed, self._time = frame.time - self._time, frame.time
         self._steps += 1
         note_skipped(self._left_out, frame)

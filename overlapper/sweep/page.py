@@ -31,7 +31,7 @@ TEMPLATE = Path(__file__).parent / "summary.html"
 
 WORST = 10
 
-# Parameters drawn at most, the first ones: of more, a page of pictures would be no summary.
+# Only the first parameters, at most this many, are drawn, so that the page stays short.
 DRAWN = 5
 
 MOVED = charts.Measure("moved", "tasks that moved, %", 100.0)
@@ -47,10 +47,10 @@ def write(
     pages: int = 0,
     comparison: Comparison | None = None,
 ) -> Path | None:
-    """Write the summary of the tasks of a sweep that are done, and return where; None if there are none.
+    """Write the summary of the finished tasks of a sweep, and return its path; None if no task is finished.
 
-    `scene` is the name or path that commands give to it. Of the `pages` worst tasks the pages are written, too. With a
-    `comparison`, it shows what has moved.
+    `scene` is the name or path of the scene in commands. The pages of the `pages` worst tasks are written, too. With a
+    `comparison`, the summary shows which tasks have moved.
     """
     forces = [charts.FORCE] * (sweep.study.contact == "volumetric")
     measures = [*charts.MEASURES, *forces]
@@ -93,7 +93,7 @@ def _opening(sweep: Sweep, columns: Columns, varied: Mapping[str, int]) -> str:
 
 
 def _varied(columns: Columns) -> dict[str, int]:
-    """How many values each parameter has that has more than one, one that is called seed last."""
+    """The number of values of each parameter with more than one value. A parameter called seed comes last."""
     counts = {name: len(np.unique(values)) for name, values in columns.items()}
     return {name: counts[name] for name in sorted(counts, key=lambda name: name == "seed") if counts[name] > 1}
 
@@ -103,7 +103,7 @@ def _view(row: Row) -> Path:
 
 
 def _show(sweep: Sweep, row: Row, place: Path) -> None:
-    """The page of a task, as the command beside it writes it."""
+    """Write the page of a task: the same page that the command beside it writes."""
     place.parent.mkdir(exist_ok=True)
     parameters = {name: row[name] for name in sweep.points[0]}
     with recorder(place, []) as record, closing(sweep.study.frames(parameters)) as frames:
@@ -151,7 +151,7 @@ def _worst(sweep: Sweep, store: Store, scene: str, worst: Sequence[Row]) -> str:
 
 
 def _moved(sweep: Sweep, comparison: Comparison) -> Iterable[str]:
-    """The changes since another sweep: how many, where over the parameters, and the worst tasks."""
+    """The changes since another sweep: their number, their distribution over the parameters, and the worst tasks."""
     first, *more = comparison.lines(0)
     said = " ".join([first, *(line for line in more if not line.startswith(" "))])
     yield f"<h2>What has moved</h2><p>{html.escape(said)}</p>"

@@ -1,4 +1,4 @@
-"""The tables of some tasks as the bytes of Parquet files: what they came to, the steps that are kept, and failures."""
+"""The tables of some tasks as the bytes of Parquet files: results, kept steps, and failures."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from overlapper.sweep.study import Task
     from overlapper.tables.table import Row
 
-# The name of the task, and of the tables in which tasks are.
+# The column with the name of the task, and the names of the tables.
 TASK = "task"
 TASKS, STEPS, FAILURES = "tasks", "steps", "failures"
 
-# The columns of a task that failed: our word and sentence, and its own traceback.
+# The columns of a task that failed: a word and a sentence by this package, and the traceback of the task.
 FAILED: dict[str, type] = {"what": str, "sentence": str, "traceback": str}
 
 OF: dict[str, Mapping[str, type]] = {TASKS: MEASURES, STEPS: COLUMNS, FAILURES: FAILED}
@@ -28,7 +28,7 @@ OF: dict[str, Mapping[str, type]] = {TASKS: MEASURES, STEPS: COLUMNS, FAILURES: 
 # The columns that volumetric contact adds to them.
 FORCES_OF: dict[str, Mapping[str, type]] = {TASKS: FORCES, STEPS: FORCE_COLUMNS, FAILURES: {}}
 
-# In the metadata of a part of tasks: the name of the part with their steps. In that of steps: a digest of their tasks.
+# Metadata keys. A part of tasks holds the name of the part with their steps; a part of steps, a digest of its tasks.
 STEPS_PART, OF_TASKS = b"steps part", b"of tasks"
 
 
@@ -43,16 +43,16 @@ def arrow() -> Any:
 
 
 def must_be_no_columns(defaults: Mapping[str, Parameter]) -> None:
-    """ValueError if a parameter has the name of a column of ours."""
+    """ValueError if a parameter has the same name as a column of the tables."""
     for table, columns in OF.items():
         if taken := defaults.keys() & {TASK, *columns, *FORCES_OF[table]}:
             raise ValueError(f"the parameter {min(taken)!r} has the name of a column of the table of {table}")
 
 
 def filled(table: str, found: Iterable[tuple[Task, Sequence[Row]]], heading: Mapping[str, str]) -> Any:
-    """The Arrow table of some tasks, at least one, with the name and the parameters of each in all of its rows.
+    """The Arrow table of one or more tasks. Every row of a task has the name and the parameters of the task.
 
-    `heading` says what the study is of: with volumetric contact, there are columns of forces.
+    `heading` describes the study. With volumetric contact, there are columns of forces.
     """
     pyarrow = arrow()
     found = [*found]
@@ -67,13 +67,13 @@ def filled(table: str, found: Iterable[tuple[Task, Sequence[Row]]], heading: Map
 
 
 def parts(tables: Mapping[str, Any]) -> dict[str, bytes]:
-    """The tables as Parquet files; equal rows are equal bytes. The part of tasks says which part has their steps."""
+    """The tables as Parquet files; equal rows give equal bytes. The part of tasks names the part with their steps."""
     made: dict[str, bytes] = {}
-    for table in (STEPS, TASKS, FAILURES):  # the steps first, as their digest is in the tasks
+    for table in (STEPS, TASKS, FAILURES):  # the steps first, because the part of tasks holds their digest
         if table in tables:
             content = tables[table].combine_chunks()
             said = dict(content.schema.metadata)
-            if table == STEPS:  # whether it has rows or not, it is of these tasks alone
+            if table == STEPS:  # with or without rows, it belongs to these tasks only
                 said[OF_TASKS] = digest("".join(tables[TASKS].column(TASK).to_pylist()).encode())
             elif table == TASKS and STEPS in made:
                 said[STEPS_PART] = digest(made[STEPS])
@@ -82,7 +82,7 @@ def parts(tables: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def digest(data: bytes) -> str:
-    """The name of a part, 32 hexadecimal digits: whoever reads it sees whether a bit of it has changed."""
+    """The name of a part, 32 hexadecimal digits. A reader can tell from it whether any bit of the part has changed."""
     return hashlib.sha256(data).hexdigest()[:32]
 
 

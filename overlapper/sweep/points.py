@@ -1,4 +1,4 @@
-"""Where in the space of its parameters a scene is run: grids, seeds, samples and tables of points, crossed."""
+"""The parameter values at which a scene is run: products of grids, seeds, samples and tables of points."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from overlapper.scenes.parameters import Parameter, known, value_of
 
 Point = dict[str, Parameter]
 
-MOST = 10_000_000  # tasks of a sweep; beyond, somebody has mistyped
+MOST = 10_000_000  # tasks of a sweep; a larger number is taken for a typing error
 
 
 class Axis(Sequence[Point]):
-    """The points of an axis, as columns of values by the name of the parameter: dictionaries take ten times as much."""
+    """The points of an axis, as columns of values by parameter. Dictionaries would take ten times as much memory."""
 
     def __init__(self, columns: Mapping[str, Sequence[Parameter]]) -> None:
         self.columns = columns
@@ -41,14 +41,14 @@ class Axis(Sequence[Point]):
         """Each point once."""
         if any(isinstance(values, range) for values in self.columns.values()):
             return self
-        if len(self.columns) == 1:  # without a tuple for each value
+        if len(self.columns) == 1:  # avoids a tuple for each value
             ((name, values),) = self.columns.items()
             return Axis({name: [*dict.fromkeys(values)]})
         return Axis.of([*self.columns], [*dict.fromkeys(zip(*self.columns.values()))])
 
 
 class Points(Sequence[Point]):
-    """All parameters of each point of the product of some axes, the last one moving fastest, made when asked for."""
+    """All parameters of each point of the product of axes, computed on access. The last axis varies fastest."""
 
     def __init__(self, start: Mapping[str, Parameter], axes: Sequence[Axis]) -> None:
         self._start, self._axes = dict(start), axes
@@ -81,15 +81,17 @@ def array_of(values: Sequence[Parameter]) -> NDArray[Any]:
 
 @dataclass(frozen=True, slots=True)
 class Space:
-    """The parameters of a scene: their defaults, by name, and which of them are `settled` for all points."""
+    """The parameters of a scene: their defaults, by name, and which of them are `settled`, the same for all points."""
 
     scene: str
     defaults: Mapping[str, Parameter]
     settled: Collection[str] = ()
 
     def grid(self, text: str) -> Axis:
-        """A parameter with its values: "friction=0.3,0.5", or so many from one number to another, "mass=0.1:10:20",
-        in equal steps or, with ":log", by equal factors."""
+        """The axis of one parameter: listed values, "friction=0.3,0.5", or a range with a count, "mass=0.1:10:20".
+
+        A range has equal steps or, with ":log" at the end, equal factors.
+        """
         name, values = self._named(text, "--grid")
         default = self.defaults[name]
         parts = values.split(":")
@@ -105,13 +107,13 @@ class Space:
         return Axis({name: [round(each) for each in found] if type(default) is int else found})
 
     def seeds(self, count: int) -> Axis:
-        """The parameter `seed` from 0 on."""
+        """The parameter `seed` with `count` values, from 0 on."""
         if type(self.defaults.get("seed")) is not int:
             raise ValueError(f"--seeds is for scenes with a parameter `seed`, a whole number; {self.scene} has none")
         return Axis({"seed": range(count)})
 
     def samples(self, count: int, ranges: Sequence[str], seed: int) -> Axis:
-        """A Latin hypercube of the ranges, "mass=0.1:10" or, with equal chances by factors, "mass=0.1:10:log"."""
+        """A Latin hypercube sample of the ranges: "mass=0.1:10" is uniform, "mass=0.1:10:log" is log-uniform."""
         if not ranges:
             raise ValueError("--sample needs a --range NAME=FROM:TO for each parameter that it draws")
         asked = [self._range(text) for text in ranges]
@@ -136,7 +138,7 @@ class Space:
 
     def _drawn(self, asked: tuple[str, float, float, bool], part: float) -> Parameter:
         name, low, high, log = asked
-        if type(self.defaults[name]) is int:  # of which the first and the last have as much room as the others
+        if type(self.defaults[name]) is int:  # the first and the last integer get as much room as the others
             low, high = low - 0.5 + log * 0.5, high + 0.5
         value = math.exp(math.log(low) + part * math.log(high / low)) if log else low + part * (high - low)
         if type(self.defaults[name]) is int:
@@ -144,7 +146,7 @@ class Space:
         return min(max(value, low), high)
 
     def read(self, path: Path) -> Axis:
-        """The points of a CSV table: a column for each parameter that is not to be its default."""
+        """The points of a CSV table. Parameters without a column keep their defaults."""
         with path.open(encoding="utf-8", newline="") as file:
             reader = csv.reader(file)
             rows = (cells for cells in reader if cells and not cells[0].startswith("#"))
@@ -166,7 +168,7 @@ class Space:
         return Axis.of(names, points)
 
     def crossed(self, axes: Iterable[Axis]) -> Points:
-        """All parameters of each point of the product of the axes, the last one moving fastest; none of them twice."""
+        """All parameters of each point of the product of the axes, no point twice. The last axis varies fastest."""
         axes = [*axes]
         taken = set(self.settled)
         for axis in axes:

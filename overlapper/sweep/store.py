@@ -1,8 +1,8 @@
-"""The folder of a sweep: parts of many tasks each, so that what is there is done, and nothing is there twice.
+"""The folder of a sweep. Its files are parts of many tasks each. Every task in the folder is complete and there once.
 
-`tasks.parquet`, `steps.parquet` and `failures.parquet` are folders, which readers take for one table each. A part is
-named by the digest of its bytes and takes its place whole, when all of its tasks have come to something. Until then
-they are in pieces, in the same three tables of the folder `.unfinished`. `sweep.json` says what all of them are of.
+`tasks.parquet`, `steps.parquet` and `failures.parquet` are folders, and readers take each folder for one table. A part
+is named by the digest of its bytes. It is put in place as a whole when all of its tasks are done or have failed. Until
+then its tasks are in pieces, in the same three tables of the folder `.unfinished`. `sweep.json` identifies the sweep.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from overlapper.whole_file import beside
 
 Names = NDArray[np.bytes_]  # of tasks, 16 bytes each
 
-# Says in sweep.json that parts are named by their digests; earlier versions named them by their only task.
+# Written to sweep.json: parts are named by their digests. Earlier versions named each part by its only task.
 LAYOUT = {"parts": "named by digest"}
 
 
@@ -40,24 +40,24 @@ class Known(Protocol):
 
 
 def names_of(column: Any) -> Names:
-    """The names of tasks in an Arrow column. ValueError if they are none."""
+    """The names of tasks in an Arrow column. ValueError if the column does not hold names."""
     return np.frombuffer(bytes.fromhex("".join(column.to_pylist())), "S16")
 
 
 def text_of(name: bytes) -> str:
     """The name of a task as it is in a table, 32 hexadecimal digits."""
-    return bytes(name).ljust(16, b"\0").hex()  # NumPy leaves out zeros at the end
+    return bytes(name).ljust(16, b"\0").hex()  # NumPy drops zeros at the end
 
 
 def among(names: Names, known: Names) -> NDArray[np.bool_]:
-    """Which names are among known ones, which are sorted."""
+    """Which names are in `known`, which is sorted."""
     if not len(known):
         return np.zeros(len(names), bool)
     return np.equal(known[np.minimum(np.searchsorted(known, names), len(known) - 1)], names)
 
 
 class Broken(ValueError):
-    """A part is not as it was written; the text is a sentence with its path."""
+    """A part differs from what was written. The text is a sentence with the path of the part."""
 
     def __init__(self, path: Path, what: str = "is not as it was written") -> None:
         super().__init__(f"{path} {what}")
@@ -65,19 +65,19 @@ class Broken(ValueError):
 
 
 def content(path: Path, columns: Sequence[str] | None = None) -> Any:
-    """The Arrow table of a part, or those columns of it. Broken if it is not as it was written."""
+    """The Arrow table of a part, or the given columns of it. Broken if the part differs from what was written."""
     pyarrow = arrow()
     data = _must_be_whole(path)
     try:
         file = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(data), page_checksum_verification=True)
-        # Without threads: one that Arrow has just started may abort a process that ends.
+        # Without threads: a thread that Arrow has just started may abort a process that is ending.
         return file.read(columns=columns, use_threads=False)
     except (pyarrow.ArrowException, OSError) as error:
         raise Broken(path, f"cannot be read: {first_line(error)}") from error
 
 
 def _must_be_whole(path: Path) -> bytes:
-    """The bytes of a part."""
+    """The bytes of a part. Broken if the part is missing or differs from what was written."""
     try:
         data = path.read_bytes()
     except FileNotFoundError as error:
@@ -94,7 +94,7 @@ class Shelf:
         self.folder = folder
 
     def path(self, table: str) -> Path:
-        """Where a table is, if it has any rows."""
+        """The folder of a table. It exists if the table has any rows."""
         return self.folder / f"{table}.parquet"
 
     def files(self, table: str) -> list[Path]:
@@ -102,7 +102,7 @@ class Shelf:
         return sorted(self.path(table).glob("*.parquet"))
 
     def put(self, tables: Mapping[str, bytes], begun: str) -> list[Path]:
-        """Put parts in their places, that of the tasks after that of their steps. They are written to `begun` first."""
+        """Put parts in their places: the steps before their tasks. Each part is written to the file `begun` first."""
         places = []
         for table in (STEPS, TASKS, FAILURES):
             if table in tables:
@@ -112,14 +112,15 @@ class Shelf:
         return places
 
     def steps_of(self, part: Path, schema: Any = None) -> Path | None:
-        """The part that has the steps of a part of tasks; `schema` is that of the part, if it has been read."""
+        """The part with the steps of a part of tasks. `schema` is the schema of `part`, if it has been read."""
         name = ((schema or arrow().parquet.read_schema(part)).metadata or {}).get(STEPS_PART)
         return self.path(STEPS) / f"{name.decode()}.parquet" if name else None
 
     def checked(self, broken: list[Path]) -> dict[Path, Names]:
-        """The names of the tasks in each part of tasks and failures; parts that are not as they were written go away.
+        """The names of the tasks in each part of tasks and failures.
 
-        So do tasks without their steps, and steps without their tasks, as a kill may leave them.
+        Parts that differ from what was written are deleted. Tasks without their steps and steps without their tasks,
+        which a kill may leave, are deleted, too.
         """
         found: dict[Path, Names] = {}
         steps: set[Path] = set()
@@ -140,7 +141,7 @@ class Shelf:
         return found
 
     def remove(self, part: Path) -> None:
-        """Take a part away, with its steps."""
+        """Delete a part and its steps."""
         steps = self.steps_of(part)
         part.unlink()
         if steps:
@@ -148,10 +149,11 @@ class Shelf:
 
 
 def _put(data: bytes, begun: str, place: Path) -> None:
-    """It does not wait for the disk, which takes longer than many a task. A power cut, unlike a kill, may leave half of
-    what is seconds old, and then it is done again.
+    """Write a part without waiting for the disk, because waiting takes longer than many tasks.
+
+    A kill leaves no part half written. A power cut may damage parts that are seconds old; their tasks are done again.
     """
-    # A file object would add four system calls.
+    # A file object would need four more system calls.
     file = os.open(begun, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
     try:
         unwritten = memoryview(data)
@@ -165,15 +167,15 @@ def _put(data: bytes, begun: str, place: Path) -> None:
 class Store(Shelf):
     """The parts in a folder, for one sweep at a time.
 
-    `identity` is what a sweep must have in common with one that is there already. `broken` names the parts that were
-    not as they were written, and are gone. OSError if there can be no such folder, ValueError if it is that of another
-    sweep, or if one is at work in it.
+    `identity` must equal the identity of a sweep that is already in the folder. `broken` lists the parts that differed
+    from what was written; they are deleted. OSError if the folder cannot be made. ValueError if the folder belongs to
+    another sweep, or if another process is at work in it.
     """
 
     def __init__(self, folder: Path, identity: Mapping[str, str]) -> None:
         super().__init__(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        # Beside the tables, whose every file readers take for a part.
+        # Beside the tables: readers take every file in a table's folder for a part.
         self._begun = f"{folder}/.begun.parquet"
         self._pieces = Shelf(folder / ".unfinished")
         self.broken: list[Path] = []
@@ -205,8 +207,10 @@ class Store(Shelf):
         raise ValueError(f"the sweep in {self.folder} is of {name} {was}, not {now}: give another --out")
 
     def settle(self) -> None:
-        """Read which tasks are done and which have failed. Rows of failures that were done since, or are there twice,
-        are taken out of their parts."""
+        """Read which tasks are done and which have failed.
+
+        Rows of failures are removed if the task has been done since or has another row.
+        """
         self._settle(self.checked(self.broken))
 
     def _settle(self, found: Mapping[Path, Names]) -> None:
@@ -222,7 +226,7 @@ class Store(Shelf):
                 if len(rows):
                     self.keep(parts({FAILURES: rows}))
                 path.unlink()
-        with suppress(OSError):  # it is not empty, or not there
+        with suppress(OSError):  # the folder is not empty, or does not exist
             self.path(FAILURES).rmdir()
         self.failed = _joined([names[stay]])
 
@@ -231,19 +235,19 @@ class Store(Shelf):
         self.put(tables, self._begun)
 
     def keep_piece(self, tables: Mapping[str, bytes]) -> list[Path]:
-        """Put a piece of a part in its place; returns the paths that `assemble` takes."""
+        """Put a piece of a part in its place, and return the paths for `assemble`."""
         return [path for path in self._pieces.put(tables, self._begun) if path.parent != self._pieces.path(STEPS)]
 
     def is_done(self, piece: Path) -> bool:
-        """Whether the tasks of a piece are done, and have not failed."""
+        """Whether the tasks of a piece are done, as opposed to failed."""
         return piece.parent == self._pieces.path(TASKS)
 
     def assemble(self, sweep: Known, pieces: Sequence[Path]) -> None:
-        """Make a part of pieces; of what is in a part already, as a kill came before its pieces were gone, nothing."""
+        """Make a part of pieces. Tasks that are in a part already are left out: a kill may leave their pieces."""
         rows: dict[str, Any] = {}
         for table, there in ((TASKS, [self.done]), (FAILURES, [self.done, self.failed])):
             found = [content(path) for path in pieces if path.parent == self._pieces.path(table)]
-            if TASKS in rows:  # what had failed may have been done again
+            if TASKS in rows:  # a task that had failed may have been done again
                 there = [*there, np.sort(names_of(rows[TASKS].column(TASK)))]
             if found:
                 names = names_of((whole := _sorted(sweep, found)).column(TASK))
@@ -261,11 +265,11 @@ class Store(Shelf):
             self._pieces.remove(path)
 
     def rows(self, table: str, columns: Sequence[str] | None = None) -> Iterator[Any]:
-        """The Arrow table of each part of a table. Broken if one is not as it was written."""
+        """The Arrow table of each part of a table. Broken if a part differs from what was written."""
         return (content(path, columns) for path in self.files(table))
 
     def columns(self, table: str, sweep: Known, wanted: Sequence[str]) -> tuple[NDArray[np.intp], dict[str, Any]]:
-        """The numbers of the tasks of a sweep that are in a table, in order, and columns of them; nulls are 0."""
+        """The numbers of the tasks of a sweep that are in a table, in order, and their columns; nulls become 0."""
         numbers = [np.empty(0, np.intp)]
         chunks: dict[str, list[Any]] = {name: [] for name in wanted}
         known: dict[str, str] = {}
@@ -279,7 +283,7 @@ class Store(Shelf):
         return whole[order], {name: np.concatenate(found)[order] for name, found in chunks.items() if found}
 
     def rows_of(self, table: str, sweep: Known, numbers: Sequence[int], but: str = "") -> list[dict[str, Any]]:
-        """The rows of some tasks of a sweep, in that order, without a column."""
+        """The rows of some tasks of a sweep, in the order of `numbers`, without the column `but`."""
         wanted = np.sort(sweep.names[numbers])
         parts = (part.filter(arrow().array(among(names_of(part.column(TASK)), wanted))) for part in self.rows(table))
         parts = (part.drop_columns([but] if but else []) for part in parts)
@@ -288,11 +292,11 @@ class Store(Shelf):
         return [found[name] for name in wanted_names if name in found]
 
     def close(self) -> None:
-        """Let another sweep at it."""
+        """Release the folder for other sweeps."""
         with suppress(FileNotFoundError):
             os.unlink(self._begun)
         for folder in (*map(self._pieces.path, (TASKS, STEPS, FAILURES)), self._pieces.folder):
-            with suppress(OSError):  # it is not empty, or not there
+            with suppress(OSError):  # the folder is not empty, or does not exist
                 folder.rmdir()
         self._lock.release()
 
@@ -306,7 +310,7 @@ class Store(Shelf):
 
 
 def _array(column: Any, known: dict[str, str]) -> NDArray[Any]:
-    """The values of an Arrow column; of equal texts there is one."""
+    """The values of an Arrow column. Equal texts share one object."""
     if arrow().types.is_string(column.type):
         return np.array([known.setdefault(text, text) for text in column.to_pylist()], object)
     return np.asarray(column.fill_null(0).to_numpy())
@@ -317,7 +321,7 @@ def _joined(names: Iterable[Names]) -> Names:
 
 
 def _sorted(sweep: Known, pieces: Sequence[Any]) -> Any:
-    """The rows of some pieces in the order of the tasks, those of a task as they are."""
+    """The rows of some pieces in the order of the tasks. The rows of one task keep their order."""
     links = STEPS_PART, OF_TASKS
     heading = {name: value for name, value in pieces[0].schema.metadata.items() if name not in links}
     rows = arrow().concat_tables([piece.replace_schema_metadata(heading) for piece in pieces])
@@ -325,7 +329,7 @@ def _sorted(sweep: Known, pieces: Sequence[Any]) -> Any:
 
 
 def _locked(folder: Path) -> Any:
-    """The lock of the folder, acquired. It ends with this process at the latest. ValueError if another sweep has it."""
+    """The acquired lock of the folder. It ends with this process at the latest. ValueError if another sweep has it."""
     try:
         from filelock import FileLock, Timeout
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""The settings that all tasks of a sweep share, and the name of a task."""
+"""The settings that all tasks of a sweep share, and the names of tasks."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from overlapper.tables.table_file import origin
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """A scene as its file was read, and how it is run: for `steps` steps, as `scenes.run.run` takes the rest.
+    """A scene as its file was read, and the settings of its runs: `steps` steps, and the arguments of `scenes.run.run`.
 
-    The rows of every step that `kept` divides are kept, of none if it is 0. `versions` are those of the packages that
-    measure: other versions may find other bits.
+    The rows of every `kept`-th step are kept, or no rows if `kept` is 0. `versions` are the versions of the packages
+    that measure, because other versions may give other bits.
     """
 
     scene: str
@@ -46,20 +46,20 @@ class Study:
         modelling: Modelling = Modelling(),  # noqa: B008
         kept: int = 0,
     ) -> Study:
-        """The study of the file as it is now."""
+        """The study of the scene file in its present state."""
         source = path.read_bytes()
         engine: Any = engine_in(path, source)
         return cls(path.stem, str(path), source, steps, contact or engine, asking, modelling, kept, origin(engine))
 
     @property
     def settings(self) -> dict[str, Any]:
-        """How the scene is run, by the names of options."""
+        """The settings of the run, by the names of the options."""
         return {"steps": self.steps, **settings_of(self.asking, self.modelling), "contact": self.contact}
 
     def loaded(self, parameters: Mapping[str, Parameter] | None = None) -> Scene:
-        """The scene, with its defaults if not with other parameters. SceneError says what is wrong with it.
+        """The scene, with the given parameters or its defaults. SceneError says what is wrong with the scene.
 
-        It is as new: what runs of it have left in its module is gone.
+        Its module is loaded anew, so earlier runs have no effect.
         """
         scene = scene_of(Path(self.path), self.source)
         return scene if parameters is None else replace(scene, parameters=dict(parameters))
@@ -69,13 +69,13 @@ class Study:
         return run(self.loaded(parameters), self.steps, self.asking, self.modelling, self.contact)
 
     def identity(self) -> dict[str, str]:
-        """All that tells this study from another, by name, as text."""
+        """Everything that distinguishes this study from others, by name, as text."""
         told = {**self.settings, "steps kept": self.kept}
         digest = hashlib.sha256(self.source).hexdigest()
         return {"scene": self.scene, "scene file": digest} | {k: str(v) for k, v in told.items()} | dict(self.versions)
 
     def digests(self) -> Callable[[Mapping[str, Parameter]], bytes]:
-        """The function that digests parameters, in 16 bytes; they are others where anything is another."""
+        """The function that digests parameters to 16 bytes. Any change of study or parameters changes the digest."""
         encode = json.JSONEncoder(sort_keys=True).encode
         study = hashlib.sha256(encode(self.identity()).encode())
 
@@ -89,7 +89,7 @@ class Study:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A point of a sweep: its digest as 32 hexadecimal digits, its number, and that of the part in which its row is."""
+    """A point of a sweep: its digest as 32 hexadecimal digits, its number, and the number of the part with its row."""
 
     name: str
     parameters: Mapping[str, Parameter]

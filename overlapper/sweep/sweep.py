@@ -1,4 +1,4 @@
-"""A sweep: the tasks that are missing are done, and what becomes of each is kept."""
+"""A sweep: does the tasks that are missing, and stores their results and failures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from overlapper.sweep.points import Points
 from overlapper.sweep.store import Names, Store, text_of
 from overlapper.sweep.study import Study, Task
 
-# A sweep has a thousand parts, more or less, or as many tasks. A part has so many rows at most, or those of one task.
+# A sweep has about PARTS parts, or one for each task if there are fewer. A part has at most ROWS rows, or one task.
 PARTS, ROWS = 1_000, 10_000
 
 Numbers = NDArray[np.intp]
@@ -27,7 +27,7 @@ Numbers = NDArray[np.intp]
 
 @dataclass(slots=True)
 class Progress:
-    """How far a sweep is: of `total` tasks, how many were there before, are done since, and have failed since."""
+    """The progress of a sweep: how many of `total` tasks were done `before`, and how many are done or failed since."""
 
     total: int
     before: int = 0
@@ -37,13 +37,13 @@ class Progress:
 
     @property
     def missing(self) -> int:
-        """Tasks that are neither done nor have failed."""
+        """The number of tasks that are neither done nor failed."""
         return self.total - self.before - self.done - self.failed - self.failed_before
 
 
 @dataclass(slots=True)
 class Sweep:
-    """The tasks of a study, one for each point. A task has the number of its point; tasks in a row make a part."""
+    """The tasks of a study, one for each point. A task has the number of its point. Consecutive tasks form a part."""
 
     study: Study
     points: Points
@@ -71,7 +71,7 @@ class Sweep:
         return Task(text_of(self.names[number]), self.points[number], number, number // self.size)
 
     def opened(self, folder: Path) -> Store:
-        """The folder in which it is or will be. See Store."""
+        """The store of this sweep in a folder, which is made if it does not exist. See Store."""
         arrow()
         return Store(folder, self.study.identity())
 
@@ -85,12 +85,12 @@ class Sweep:
         megabytes: int | None = None,
         late: Callable[[Task, int, float], object] | None = None,
     ) -> Progress:
-        """Do what is missing in the store, and with `retry` what has failed; `heard` is told now and then.
+        """Do the tasks that are missing in the store, and with `retry` the failed ones.
 
-        Tasks fail that raise, take longer than `limit` seconds, take more memory than `megabytes`, or end their
-        process. They stop no other. `late` hears of a task that takes very long, and for how many seconds; it may be
-        one of so many from that task on that are done together. NotStarted if no task can be run, OSError if a part
-        cannot be written.
+        `heard` is called with the progress. A task fails if it raises, takes longer than `limit` seconds, takes more
+        memory than `megabytes`, or ends its process. Other tasks go on. `late(task, count, seconds)` is called if one
+        of `count` tasks from `task` on, which are done together, takes very long. NotStarted if no task can be run,
+        OSError if a part cannot be written.
         """
         state, pieces = self._found(store)
         progress = Progress(len(self), before=int((state == DONE).sum()))
@@ -124,7 +124,7 @@ class Sweep:
         return progress
 
     def _found(self, store: Store) -> tuple[NDArray[np.uint8], dict[int, list[Path]]]:
-        """The state of each task, and the pieces of parts that are not whole."""
+        """The state of each task, and the pieces of unfinished parts."""
         state = np.zeros(len(self), np.uint8)
         pieces: dict[int, list[Path]] = {}
         for names, said in ((store.failed, FAILED), (store.done, DONE)):
@@ -133,7 +133,7 @@ class Sweep:
             numbers = self.numbers(names)
             if len(of := np.unique(numbers // self.size)) == 1 and of[0] >= 0:
                 pieces.setdefault(int(of[0]), []).append(path)
-            else:  # of another sweep, or cut otherwise
+            else:  # the piece is of another sweep, or of parts of another size
                 store.assemble(self, [path])
             known = _known(numbers)
             state[known] = np.maximum(state[known], DONE if store.is_done(path) else FAILED)
@@ -149,7 +149,7 @@ def _known(numbers: Numbers) -> Numbers:
 
 @dataclass(frozen=True, slots=True)
 class _Tasks(Sequence[Task]):
-    """Some tasks of a sweep, which are made when asked for."""
+    """Some tasks of a sweep, made on access."""
 
     sweep: Sweep
     chosen: Numbers

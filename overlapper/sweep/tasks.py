@@ -1,4 +1,4 @@
-"""Tasks done: each in the process of a hand, and their rows made a part beside it, before they are sent or written."""
+"""Runs tasks in worker processes, and turns their rows into parts there, before they are sent or written."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from overlapper.tables.table_file import origin
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Some tasks of a part, as parts of their own by table: how many of them are done, and how many have failed."""
+    """Some tasks of a part, as a Parquet file per table, with the numbers of tasks that are done and that failed."""
 
     part: int
     done: int
@@ -29,9 +29,9 @@ class Piece:
 
 
 def prepared(study: Study) -> Callable[[Task], dict[str, Any]]:
-    """The function that runs the tasks of a study. ValueError where a package that measures is of another version.
+    """The function that runs the tasks of a study. ValueError if a package that measures has another version here.
 
-    It returns the row of the task, and, if steps are kept, the table of their rows.
+    The function returns the row of the task, and the table of the rows of its steps, if steps are kept.
     """
     here = origin(engine_in(Path(study.path), study.source))
     if here != dict(study.versions):
@@ -53,7 +53,7 @@ def prepared(study: Study) -> Callable[[Task], dict[str, Any]]:
 
 
 def gathered(study: Study, found: Sequence[tuple[Task, Outcome]]) -> list[Piece]:
-    """The pieces that some tasks make: one for each part that any of them is of."""
+    """The pieces of some tasks: one for each part to which any of the tasks belongs."""
     heading = study.identity()
     pieces = []
     for number, group in groupby(sorted(found, key=lambda each: each[0].number), lambda each: each[0].part):

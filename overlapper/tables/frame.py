@@ -1,4 +1,4 @@
-"""A step of a simulation as tables, pages and summaries take it in."""
+"""A step of a simulation, as tables, pages and summaries take it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Shown = TypeVar("Shown", bound="AnyBodies | Still", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class Frame(Generic[Shown]):
-    """The bodies and what they share after `step` steps, `time` seconds into the simulation.
+    """The bodies and their overlaps after `step` steps, `time` seconds into the simulation.
 
     In a run, `bodies` is the same `Bodies` in every frame. In a frame that was kept or read from a file, it is a
-    `Still`. `forces`, with volumetric contact, are the mean over the step between the pairs that it pushes apart; their
-    `contacts` have no pairs that are only measured.
+    `Still`. With volumetric contact, `forces` are the mean forces over the step. They are those between the pairs that
+    volumetric contact pushes apart. Their `contacts` do not include pairs that are only measured.
     """
 
     step: int
@@ -31,9 +31,9 @@ class Frame(Generic[Shown]):
     forces: Forces | None = None
 
     def kept(self) -> Frame[Still]:
-        """A copy that later steps of the simulation do not change."""
+        """Return a copy that later steps of the simulation do not change."""
         return Frame(self.step, self.time, self.still(), self.contacts, self.forces)
 
     def still(self) -> Still:
-        """The bodies as they are now, without the simulation."""
+        """Return the bodies as they are now, without the simulation."""
         return self.bodies if isinstance(self.bodies, Still) else Still.of(self.bodies, self.forces)

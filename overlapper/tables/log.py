@@ -1,4 +1,4 @@
-"""A loop of one's own as a table."""
+"""A table of the overlaps in a loop of your own."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Log:
-    """The table that `overlapper run` writes, of a loop of one's own: a row for each contact of each step.
+    """The table of `overlapper run` for a loop of your own: a row for each contact of each step.
 
         with Log("run.parquet", bodies) as log:
             for _ in range(240):
@@ -25,17 +25,19 @@ class Log:
                 bodies.update()
                 log.add(bodies.overlaps())
 
-    `path` ends in .csv, .parquet or .sqlite; its folder is made if there is none. `per` says what a row is of: "shape",
-    two shapes, or "link", two links as a whole. `forces` says whether there are columns of forces, which `add` is given
-    then. The heading has the versions of this package and of the simulator, and what `bodies` was told of surfaces and
-    concave meshes. `settings` are what else is worth knowing, as `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
+    `path` ends in .csv, .parquet or .sqlite. Its folder is made if it does not exist. `per` says what a row is about:
+    "shape" for two shapes, or "link" for two links as a whole. With `forces`, the table has columns of forces, which
+    you give to `add`. The heading has the versions of this package and of the simulator, and how `bodies` treats
+    surfaces and concave meshes. `settings` are further entries of the heading, as in
+    `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
 
-    A step is on disk when `add` returns. The table grows beside its place, as `run.unfinished.csv`, and takes it at the
-    end of the `with`, or by `close()`, also if Ctrl-C or sys.exit() ends the loop. It stays where it is after an error,
-    and when the process is killed, and is a table like any other; `unfinished` says where. Parquet grows as CSV, too.
+    A step is on disk when `add` returns. The table grows beside its place, as `run.unfinished.csv`. It moves to its
+    place at the end of the `with`, or by `close()`, also if Ctrl-C or sys.exit() ends the loop. After an error, or if
+    the process is killed, it stays where it is. It is then a table like any other, and `unfinished` says where. A
+    Parquet table grows as CSV, too.
 
-    ValueError for another ending or `per`, TypeError without bodies, OSError if there can be no such file, ImportError
-    without the library that writes it.
+    ValueError for another ending or another `per`. TypeError without bodies. OSError if the file cannot be made.
+    ImportError without the library that writes it.
     """
 
     def __init__(
@@ -61,13 +63,15 @@ class Log:
     def add(
         self, contacts: Contacts, step: int | None = None, time: float | None = None, forces: Forces | None = None
     ) -> None:
-        """Write what `bodies.overlaps()` has found, before the next `bodies.update()`.
+        """Write what `bodies.overlaps()` has found. Call it before the next `bodies.update()`.
 
-        `forces` are those between these bodies, as `VolumetricContact.mean()` has them; of pairs without any they are
-        empty. `step` is the one after the last by default, `time`, in s, that of so many time steps of the simulator.
+        `forces` are the forces between these bodies, as `VolumetricContact.mean()` returns them. Pairs without forces
+        have empty cells. `step` is by default the one after the last. `time` (s) is by default `step` times the time
+        step of the simulator.
+
         ValueError if a step comes no later than the last, if `time` is not finite, or if `contacts` are not of these
-        bodies. ValueError, too, if there are `forces` and no columns for them, or if the log is closed. OSError if it
-        cannot be written.
+        bodies. ValueError, too, if there are `forces` and no columns for them, or if the log is closed. OSError if the
+        rows cannot be written.
         """
         if self._table is None:
             raise ValueError(f"this Log is closed: {contacts!r} came too late")
@@ -90,7 +94,7 @@ class Log:
         self.steps = step
 
     def close(self) -> None:
-        """Put the table in its place."""
+        """Put the finished table in its place."""
         table, self._table = self._table, None
         if table:
             table.close()

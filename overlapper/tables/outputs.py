@@ -31,8 +31,10 @@ Per = Literal["shape", "link"]
 
 
 def can_be_written(out: Path | None, html: Path | None, *others: Path | None) -> None:
-    """Now, not when much has been computed: ValueError, OSError or ImportError of a table, a page or a file that cannot
-    be."""
+    """Check that a table, a page and other files can be written, before much has been computed.
+
+    ValueError, OSError or ImportError if one of them cannot be.
+    """
     if out:
         must_be_a_table(out)
     if html:
@@ -45,11 +47,11 @@ def can_be_written(out: Path | None, html: Path | None, *others: Path | None) ->
 
 
 class StepTable:
-    """A table of overlaps that grows by what a step has found; the heading has the `settings`.
+    """A table of overlaps that grows by the rows of each step. Its heading has the `settings`.
 
-    `per` says whether a row is of two shapes or of two links as a whole, `forces` whether there are columns of forces,
-    too. ValueError for a name of another ending than those of TABLES, OSError if there can be no such file, ImportError
-    without the library that writes it.
+    `per` says whether a row is about two shapes or two links as a whole. `forces` says whether there are columns of
+    forces, too. ValueError for a name with an ending that is not in TABLES. OSError if the file cannot be made.
+    ImportError without the library that writes it.
     """
 
     def __init__(self, path: Path, settings: Mapping[str, Any], per: Per = "shape", forces: bool = False) -> None:
@@ -70,9 +72,10 @@ class StepTable:
         opinions: Sequence[Comparison] = (),
         forces: Forces | None = None,
     ) -> None:
-        """Write the rows of a step at once; `opinions` are FCL's of the same contacts, if it was asked.
+        """Write the rows of a step at once.
 
-        A body or link that is left out for the first time is metadata from then on.
+        `opinions` are FCL's of the same contacts, if it was asked. A body or link that is left out for the first time
+        is metadata from then on.
         """
         for each in bodies.skipped:
             if each not in self._left_out:
@@ -85,11 +88,14 @@ class StepTable:
             self._table.write(rows(step, time, bodies, contacts, opinions, forces))
 
     def close(self) -> None:
-        """Put the table in its place."""
+        """Put the finished table in its place."""
         self._table.close()
 
     def leave(self) -> Path | None:
-        """Leave the rows beside the place, and say where they are; None, and nothing is left, if there are none."""
+        """Leave the rows beside the place of the table, and return their path.
+
+        If there are no rows, no file is left, and the result is None.
+        """
         return self._table.leave()
 
 
@@ -104,10 +110,10 @@ def outputs(
     fcl: Fcl | None = None,
     forces: bool = False,
 ) -> Iterator[Callable[[Frame[Any]], None]]:
-    """Takes frames in: into the summary, the table `out` and the page `html`, in whose folders there may be none yet.
+    """Give a function that takes frames, and writes them to the summary, the table `out` and the page `html`.
 
-    The table has columns of `forces`, if frames have any. `written` gets the files that there are in the end: in their
-    place, or, if the run fails, beside it.
+    Folders of `out` and `html` are made if they do not exist. The table has columns of `forces`, if frames have any.
+    `written` gets the files that exist in the end: in their place, or, if the run fails, beside it.
     """
     for path in filter(None, (out, html)):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -129,7 +135,10 @@ def outputs(
 
 @contextmanager
 def _table(path: Path, settings: Mapping[str, Any], per: Per, forces: bool, written: list[Path]) -> Iterator[StepTable]:
-    """A table to be written; named in `written` if it has rows, or the run came to its end."""
+    """Give a table to be written.
+
+    It is named in `written` if it has rows, or if the run came to its end.
+    """
     table = StepTable(path, settings, per, forces)
     try:
         yield table
@@ -146,11 +155,11 @@ def _table(path: Path, settings: Mapping[str, Any], per: Per, forces: bool, writ
 def recorder(
     path: Path, written: list[Path], looks: Sequence[Look] = (), rate: float = PICTURES_PER_SECOND
 ) -> Iterator[Callable[[Frame[Any]], None]]:
-    """Records some of the frames it is called with, and writes the page in the end.
+    """Give a function that records some of the frames it is called with, and write the page in the end.
 
-    Besides `rate` frames per second these are the first in which a pair overlaps, so that none is missing.
-    After an error, what was recorded until then is beside the page, and named in `written`, as the page is else.
-    Nothing is written of no frame.
+    It records `rate` frames per second and, so that no pair is missing, each first frame in which a pair overlaps.
+    After an error, the frames recorded until then are beside the page and named in `written`. Otherwise the page is
+    named there. Without a frame, nothing is written.
     """
     from overlapper.viewer import Recording
 

@@ -1,4 +1,4 @@
-"""A scene at a moment, apart from the simulator: as it was seen, or as it was recorded."""
+"""A scene at one moment, apart from the simulator: as it was seen, or as it was recorded."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Still:
-    """The shapes of a scene at a moment, apart from the simulator; the fields are those of `simulation.Bodies`.
+    """The shapes of a scene at one moment, apart from the simulator. The fields are those of `simulation.Bodies`.
 
-    `forces` are those of the frame, with volumetric contact.
+    With volumetric contact, `forces` are those of the frame.
     """
 
     keys: list[Key]
@@ -37,7 +37,7 @@ class Still:
 
     @classmethod
     def of(cls, bodies: AnyBodies, forces: Forces | None = None) -> Still:
-        """The bodies as they are now, unmoved by what the simulation does next."""
+        """Return the bodies as they are now. The simulation does not change them later."""
         return cls(
             list(bodies.keys),
             list(bodies.shapes),
@@ -51,7 +51,7 @@ class Still:
 
     @classmethod
     def recorded(cls, recorded: Sequence[Row], shapes: Mapping[Key, Shape]) -> Still:
-        """The shapes of a step where its rows place them; names are numbers and all is grey.
+        """Return the shapes of a step where its rows place them. Names are numbers, and all shapes are grey.
 
         KeyError of a (body, link, shape) that `shapes` does not have.
         """
@@ -69,31 +69,34 @@ class Still:
         )
 
     def as_written(self) -> Still:
-        """With the shapes as they will be read from a file."""
+        """Return a copy with the shapes as they will be read from a file."""
         read = {id(shape): shape_of(text_of(shape)) for shape in self.shapes}
         return replace(self, shapes=[read[id(shape)] for shape in self.shapes])
 
     def moved(self, by: Sequence[float]) -> Still:
-        """All of it but the forces, moved by a vector in m."""
+        """Return a copy without forces, moved by a vector in m."""
         return replace(self, positions=self.positions + by, forces=None)
 
     @property
     def placed(self) -> list[Placed]:
-        """The shapes where they are, parallel to `keys`."""
+        """The shapes with their poses, parallel to `keys`."""
         return [Placed(*each) for each in zip(self.shapes, self.positions, self.orientations)]
 
     def rows(self, step: int, tolerance: float) -> list[Row]:
-        """A row for each pair of shapes of different bodies that overlap or touch, and one for each shape alone."""
+        """Return a row for each pair of shapes that overlap or touch, and a row for each other shape.
+
+        The shapes of a pair are of different bodies.
+        """
         pairs = rows(step, 0.0, self, self.contacts(tolerance), forces=self.forces)
         met = {shape for row in pairs for shape in (key(row)[:3], key(row)[3:])}
         return pairs + [row for row in self.placements(step) if key(row)[:3] not in met]
 
     def placements(self, step: int) -> list[Row]:
-        """A row for each shape, as if it were alone."""
+        """Return a row for each shape, as if it were alone."""
         return [{"step": step, **row, "status": "alone"} for row in placements(self, "A").values()]
 
     def contacts(self, tolerance: float) -> Contacts:
-        """The pairs of shapes of different bodies that overlap or touch."""
+        """Return the pairs of shapes of different bodies that overlap or touch."""
         # Pairs of static bodies are in it, too: whether they may be left out is the simulator's business.
         batch, where = Batch(self.shapes), (self.positions, self.orientations)
         keys = np.array(self.keys, dtype=np.int64).reshape(-1, 3)

@@ -27,7 +27,7 @@ class PairSummary:
     """Two links over a run, by their `names`: in how many `steps` they overlap, and their largest figures.
 
     - `volume` ± `volume_error`: the largest volume, in m³, in step `volume_step`. It is the volume common to the links
-      as a whole: where shapes of one link overlap each other, it counts once.
+      as a whole. Where shapes of one link overlap each other, the volume counts once.
     - `depth`: the largest depth of two of their shapes, in m, in step `depth_step`. `normal` points from the second
       link to the first.
     - `force`: the largest force that pushes the two apart, in N, in step `force_step`, with volumetric contact.
@@ -45,7 +45,7 @@ class PairSummary:
     force_step: int = 0
 
     def add(self, step: int, pair: LinkContact, force: float = 0.0) -> None:
-        """Take in what the links have in common in a step, and the force between them."""
+        """Add the overlap of the links in a step, and the force between them."""
         if force > self.force:
             self.force, self.force_step = force, step
         self.steps += 1
@@ -56,7 +56,10 @@ class PairSummary:
 
 
 def overlapping_links(frame: Frame[Any]) -> Iterator[tuple[Links, LinkContact, float]]:
-    """The pairs of links that overlap in a frame, and the force between the two in N, 0 without volumetric contact."""
+    """Yield the pairs of links that overlap in a frame, and the force between the two in N.
+
+    The force is 0 without volumetric contact.
+    """
     between = {} if frame.forces is None else frame.forces.between_links()
     for pair in filter(None, link_contacts(frame.contacts)):
         links = pair.bodyA, pair.linkA, pair.bodyB, pair.linkB
@@ -64,14 +67,14 @@ def overlapping_links(frame: Frame[Any]) -> Iterator[tuple[Links, LinkContact, f
 
 
 def note_skipped(known: dict[Skipped, int], frame: Frame[AnyBodies] | Frame[Still]) -> None:
-    """Take in what a frame leaves out: `known` has the first step of each."""
+    """Add what a frame leaves out to `known`, which has the first step of each."""
     for each in frame.bodies.skipped:
         known.setdefault(each, frame.step)
 
 
 @dataclass(frozen=True, slots=True)
 class Disagreement:
-    """FCL and we differ, or FCL gave no answer; `explanation` is one sentence."""
+    """A contact where FCL and this package differ, or where FCL gave no answer. `explanation` is one sentence."""
 
     step: int
     names: tuple[str, str]
@@ -81,12 +84,12 @@ class Disagreement:
 
 @dataclass(slots=True)
 class Summary:
-    """The frames of a run, taken in one by one.
+    """The frames of a run, added one by one.
 
     `scene` is what was run, for `steps` steps and `seconds` of simulated time. `pairs` has a `PairSummary` by (bodyA,
-    linkA, bodyB, linkB). `report` is that of `Bodies`, summed up, and `decomposed` as it is in the end. `skipped` has
-    all that was left out in any step, with the first step in which it was. If FCL was asked, `verdicts` counts what it
-    said, and `disagreements` says where it differs. `forces` says whether there were those of volumetric contact.
+    linkA, bodyB, linkB). `report` is that of `Bodies`, summed up. `decomposed` is as it is in the end. `skipped` has
+    everything that was left out in any step, with the first such step. If FCL was asked, `verdicts` counts its
+    verdicts, and `disagreements` says where it differs. `forces` says whether there were forces of volumetric contact.
     """
 
     scene: str
@@ -101,7 +104,7 @@ class Summary:
     forces: bool = False
 
     def add(self, frame: Frame[AnyBodies], opinions: Sequence[Comparison] = ()) -> None:
-        """Take in a frame; `opinions` are FCL's of its contacts, if it was asked."""
+        """Add a frame. `opinions` are FCL's of its contacts, if it was asked."""
         self.steps, self.seconds = frame.step, frame.time
         self.report = _sum(self.report, frame.bodies.report())
         note_skipped(self.skipped, frame)
@@ -122,11 +125,11 @@ class Summary:
             self.disagreements.append(Disagreement(step, names, opinion.verdict, opinion.explanation))
 
     def largest(self) -> list[PairSummary]:
-        """The pairs that overlap in any step, the largest volume first."""
+        """Return the pairs that overlap in any step, the largest volume first."""
         return sorted(self.pairs.values(), key=lambda pair: -pair.volume)
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, as JSON takes it: SI units, said in the names."""
+        """Return everything as JSON takes it. Values are in SI units, and the names say the unit."""
         return {
             "scene": self.scene,
             "steps": self.steps,
@@ -158,7 +161,7 @@ class Summary:
 
 
 def _sum(before: Report | None, now: Report) -> Report:
-    """Bodies and shapes as they are now, pairs and facets of all steps."""
+    """Return bodies and shapes as they are now, and pairs and facets of all steps."""
     if before is None:
         return now
     of_scene = {"bodies", "shapes", "shapes_read"}

@@ -1,4 +1,4 @@
-"""A run as a table: one row per step and pair, of shapes or of links, that overlaps or touches."""
+"""A run as a table: one row for each step and each pair of shapes or links that overlaps or touches."""
 
 from __future__ import annotations
 
@@ -44,7 +44,10 @@ FORCES: dict[str, type] = dict.fromkeys(FORCE_COLUMNS, float)
 
 
 class PosedBodies(Protocol):
-    """The bodies of a table: shapes by (body, link, shape), their poses in the order of the shapes, names of links."""
+    """The bodies of a table.
+
+    They have shapes by (body, link, shape), their poses in the order of the shapes, and names of links.
+    """
 
     @property
     def keys(self) -> list[tuple[int, int, int]]: ...
@@ -57,12 +60,12 @@ class PosedBodies(Protocol):
 
 
 def key(row: Row) -> tuple[Value, ...]:
-    """(bodyA, linkA, shapeA, bodyB, linkB, shapeB); None for a missing B."""
+    """Return (bodyA, linkA, shapeA, bodyB, linkB, shapeB), with None for a missing B."""
     return tuple(row.get(f"{word}{side}") for side in "AB" for word in ("body", "link", "shape"))
 
 
 def poses(rows: Sequence[Row]) -> dict[tuple[int, Key], NDArray[np.float64]]:
-    """Position and orientation (7,) of every shape, by step and (body, link, shape)."""
+    """Return position and orientation (7,) of every shape, by step and (body, link, shape)."""
     where = {}
     for row in rows:
         for side in "A" if row["status"] == "alone" else "AB":
@@ -74,7 +77,10 @@ def poses(rows: Sequence[Row]) -> dict[tuple[int, Key], NDArray[np.float64]]:
 
 
 def placements(bodies: PosedBodies, side: str) -> dict[tuple[int, int, int], Row]:
-    """Which shape, and where: the columns of side "A" or "B" for every shape, by (body, link, shape)."""
+    """Return the columns of side "A" or "B" for every shape, by (body, link, shape).
+
+    They say which shape it is, and where it is.
+    """
     names = bodies.names
     poses = np.hstack([bodies.positions, bodies.orientations]).tolist()
     return {
@@ -97,7 +103,10 @@ def rows(
     opinions: Sequence[Comparison] = (),
     forces: Forces | None = None,
 ) -> list[Row]:
-    """The rows of one step; `opinions` are FCL's of the same contacts, if it was asked, `forces` those between them."""
+    """Return the rows of one step.
+
+    `opinions` are FCL's of the same contacts, if it was asked. `forces` are the forces between them.
+    """
     pushed = _pushed(forces)
     a, b = placements(bodies, "A"), placements(bodies, "B")
     table: list[Row] = []
@@ -123,7 +132,7 @@ def _key(contact: Contact) -> tuple[int, ...]:
 
 
 def _pushed(forces: Forces | None) -> dict[tuple[int, ...], Row]:
-    """The columns of FORCES by pair of shapes."""
+    """Return the columns of FORCES by pair of shapes."""
     if forces is None:
         return {}
     keys = map(tuple, forces.pairs.tolist())
@@ -133,9 +142,10 @@ def _pushed(forces: Forces | None) -> dict[tuple[int, ...], Row]:
 def link_rows(
     step: int, time: float, bodies: PosedBodies, pairs: Sequence[LinkContact], forces: Forces | None = None
 ) -> list[Row]:
-    """The rows of one step by links as a whole; columns of single shapes, their poses, area, slip and FCL, are empty.
+    """Return the rows of one step for links as a whole.
 
-    Forces and energies are sums over the pairs of their shapes, and so are torques, about the centroid of the links.
+    The columns of single shapes, their poses, area, slip and FCL, are empty. Forces and energies are sums over the
+    pairs of their shapes. Torques are sums about the centroid of the links.
     """
     names = bodies.names
     at = {} if forces is None else {pair: k for k, pair in enumerate(map(tuple, forces.pairs.tolist()))}
@@ -160,7 +170,7 @@ def link_rows(
 
 
 def _sum_of(pair: LinkContact, forces: Forces | None, which: Sequence[int]) -> Row:
-    """The columns of FORCES of two links, of those rows of `forces`."""
+    """Return the columns of FORCES of two links, summed over these rows of `forces`."""
     if forces is None or pair.centroid is None or not which:
         return {}
     arms = np.nan_to_num(forces.centre[which]) - pair.centroid

@@ -1,8 +1,8 @@
 """Tables in files: CSV, Parquet and SQLite, written step by step, and readable however the run ends.
 
-Every file says in its metadata what wrote it and with which settings; the units are in the names of the columns. A
-table grows beside its place (`overlapper.whole_file`) and takes it when it is closed. What a killed run has finished is
-in `run.unfinished.csv`, and is a table of its own. That of a Parquet file is a CSV file, too.
+The metadata of every file says what wrote the file and with which settings. The units are in the names of the columns.
+A table grows beside its place (`overlapper.whole_file`) and moves to its place when it is closed. The finished steps of
+a killed run are in `run.unfinished.csv`, which is a table of its own. For a Parquet file, this is a CSV file, too.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ DENSEST = 4
 
 
 def origin(engine: str = "") -> dict[str, str]:
-    """The versions of this package and, if it is installed, of the library of the engine that simulated."""
+    """Return the versions of this package and, if it is installed, of the library of the engine that simulated."""
     found = {"overlapper": __version__}
     if engine in LIBRARIES:
         with suppress(PackageNotFoundError):
@@ -57,7 +57,7 @@ def origin(engine: str = "") -> dict[str, str]:
 class Content:
     """The content of a table: its metadata by name, its rows, and the comments of a CSV file.
 
-    A comment is the text of a line behind its #, with the number of rows above that line.
+    A comment is the text of a line after its #, with the number of rows above that line.
     """
 
     metadata: dict[str, str]
@@ -66,10 +66,11 @@ class Content:
 
 
 class Table(Protocol):
-    """A file that grows by the rows of a step at a time; those of finished steps outlive even a SIGKILL.
+    """A file that grows by the rows of one step at a time. Rows of finished steps survive even a SIGKILL.
 
-    `remark` adds to the metadata what is known only then. One of `close` and `leave` ends it. `close` puts it in its
-    place. `leave` does not, and returns where the rows are; None if there are none, and then nothing is left of it.
+    `write` adds the rows of a step. `remark` adds metadata that became known only during the run. Call one of `close`
+    and `leave` at the end. `close` puts the table in its place. `leave` does not, and returns the path of the rows. If
+    there are no rows, `leave` returns None and leaves no file.
     """
 
     def write(self, rows: Iterable[Row]) -> None: ...
@@ -79,7 +80,7 @@ class Table(Protocol):
 
 
 class Seal:
-    """The number of rows of a table and a digest of the lines that they are in CSV, and how many bytes those are."""
+    """The number of rows of a table, and the number of bytes and a digest of its lines as CSV."""
 
     def __init__(self, text: bytes = b"", rows: int = 0, before: Seal | None = None) -> None:
         self.rows, self.size = rows, len(text)
@@ -90,14 +91,14 @@ class Seal:
 
     @classmethod
     def of(cls, columns: Sequence[str], rows: Iterable[Iterable[Value]] = ()) -> Seal:
-        """The seal of a whole table, of rows in the order of the columns."""
+        """Return the seal of a whole table, of rows in the order of the columns."""
         seal = cls(_text([",".join(columns)]))
         for row in rows:
             seal = seal.further(_text([_line(row)]), 1)
         return seal
 
     def further(self, text: bytes, rows: int = 0) -> Seal:
-        """The seal of this and further lines. This one stays as it is, as a signal may come at any time."""
+        """Return the seal of this and further lines. This seal does not change, as a signal may come at any time."""
         return Seal(text, rows, self)
 
     def __str__(self) -> str:
@@ -105,9 +106,9 @@ class Seal:
 
 
 class CsvTable:
-    """Comma-separated values below lines of metadata that begin with #; a step is handed to the system at once.
+    """Comma-separated values below lines of metadata that begin with #. Each step is given to the system at once.
 
-    The last line of the heading has the number of rows and a digest of all that is below it, once the table is closed.
+    When the table is closed, the last line of the heading gets the number of rows and a digest of everything below it.
     """
 
     def __init__(
@@ -142,11 +143,11 @@ class CsvTable:
         self.comment(f"{name}: {printable(value)}")
 
     def comment(self, text: str) -> None:
-        """A line that readers of the rows pass over."""
+        """Add a line that readers of the rows skip."""
         self._grow(_text([f"# {text}"]))
 
     def _grow(self, text: bytes, rows: int = 0) -> None:
-        """Add lines. A signal may end this in the middle; the next lines, or the end, then take their place."""
+        """Add lines. If a signal interrupts this, the next lines, or the end, overwrite the partial lines."""
         self._write(text, self._body + self._seal.size)
         self._seal = self._seal.further(text, rows)
 
@@ -185,17 +186,20 @@ def _line(row: Iterable[Value]) -> str:
 
 
 def _seal_line(told: str) -> str:
-    """The line that tells whether all below it is there; of the same length before that is known."""
+    """Return the line that tells whether all rows are there. Before that is known, it has the same length."""
     return f"# rows: {told:>84}"
 
 
 def _count(body: bytes) -> int:
-    """The rows below the line with the names of columns; none of their cells has a line break."""
+    """Return the number of rows below the line with the names of columns. None of their cells has a line break."""
     return max(sum(not line.startswith(b"#") for line in body.splitlines()) - 1, 0)
 
 
 def _cell(value: Value) -> str:
-    """As the csv module has it, but text with a # is quoted, too: some readers take the rest for a comment."""
+    """Return a value as the csv module writes it, except that text with a # is quoted, too.
+
+    Some readers take what follows a # for a comment.
+    """
     if not isinstance(value, str):
         return "" if value is None else repr(value)
     value = printable(value)
@@ -203,9 +207,10 @@ def _cell(value: Value) -> str:
 
 
 def _csv_text(path: Path) -> str:
-    """The text of a CSV table, which is whole: a last line without an end, which a kill may leave, is left out.
+    """Return the text of a CSV table without a last line that has no end, which a kill may leave.
 
-    ValueError if rows are missing, or are not as they were written; a table without a line `# rows` is taken as it is.
+    ValueError if rows are missing or have changed since they were written. A table without a line `# rows` is not
+    checked.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -222,13 +227,19 @@ def _csv_text(path: Path) -> str:
 
 
 def _other(path: Path, written: str, there: int) -> ValueError:
-    """The error for a table that is not as it was written; `written` is its number of rows then, as text."""
+    """Return the error for a table that has changed since it was written.
+
+    `written` is the number of rows that was written, as text. `there` is the number of rows now.
+    """
     what = f"{there:,} of its {written} rows are there" if f"{there:,}" != written else "a line of it is another"
     return ValueError(f"{path} is not as it was written: {what}")
 
 
 def _sealed(path: Path, metadata: Mapping[str, str], columns: Sequence[str], rows: list[Row]) -> list[Row]:
-    """The rows of a table that is no CSV, if its seal fits; earlier versions wrote the number of rows, or nothing."""
+    """Return the rows of a table that is not CSV, if its seal fits.
+
+    Earlier versions wrote only the number of rows, or nothing.
+    """
     told = metadata.get("rows")
     if told is None or told == str(len(rows)) or told == str(Seal.of(columns, (row.values() for row in rows))):
         return rows
@@ -236,7 +247,7 @@ def _sealed(path: Path, metadata: Mapping[str, str], columns: Sequence[str], row
 
 
 def _csv_content(path: Path) -> Content:
-    """A CSV table; empty cells are None."""
+    """Return the content of a CSV table. Empty cells are None."""
     lines = _csv_text(path).splitlines(keepends=True)
     content = Content(_heading(lines))
 
@@ -262,7 +273,10 @@ def _csv_content(path: Path) -> Content:
 
 
 def _heading(lines: Sequence[str]) -> dict[str, str]:
-    """The metadata of a CSV table, by name: in its first lines, and what was left out of it, in comments below."""
+    """Return the metadata of a CSV table by name.
+
+    It is in the first lines. The entries about what was left out are in comments below.
+    """
     heading = itertools.takewhile(lambda line: line.startswith("# "), lines)
     below = (line for line in lines if line.startswith(f"# {LEFT_OUT}"))
     told = (line[2:].partition(": ") for line in itertools.chain(heading, below))
@@ -286,7 +300,7 @@ def _check_columns(path: Path, columns: Sequence[str]) -> None:
 
 
 def _checked(row: Row) -> Row:
-    """The row, if its values are of the columns' types."""
+    """Return the row, if its values have the types of the columns."""
     for name, value in row.items():
         kind = KNOWN[name]
         if kind is float and type(value) is int:
@@ -301,10 +315,10 @@ def _checked(row: Row) -> Row:
 
 
 class ParquetTable(CsvTable):
-    """Parquet by pyarrow.
+    """A Parquet table, written with pyarrow.
 
-    A Parquet file cannot be read before its end is written, and a file for each step would take a millisecond. So the
-    table grows as CSV, in `run.unfinished.csv`, and `close` makes a Parquet file of it.
+    A Parquet file cannot be read before its end is written, and a file for each step would take a millisecond. The
+    table therefore grows as CSV, in `run.unfinished.csv`, and `close` makes a Parquet file of it.
     """
 
     GROUP = 20_000  # rows; a row group of a few megabytes, as Parquet's readers expect
@@ -359,7 +373,10 @@ class ParquetTable(CsvTable):
 
 @contextmanager
 def _named(path: Path, *kinds: type[Exception]) -> Iterator[None]:
-    """Turn a library's error about a file that it cannot write into an OSError with the file's name and a reason."""
+    """Turn a library's error about a file that it cannot write into an OSError.
+
+    The OSError has the file's name and a reason.
+    """
     try:
         yield
     except OSError as error:
@@ -371,10 +388,10 @@ def _named(path: Path, *kinds: type[Exception]) -> Iterator[None]:
 
 
 class SqliteTable:
-    """SQLite: the rows are in the table `overlaps`, the metadata in `metadata`; a step is a transaction.
+    """A SQLite table: rows are in the table `overlaps`, metadata in the table `metadata`. Each step is a transaction.
 
-    While the run goes on, and after a kill, the last steps are in `run.unfinished.sqlite-wal`, where every reader looks
-    for them.
+    During the run, and after a kill, the last steps are in `run.unfinished.sqlite-wal`, where every reader looks for
+    them.
     """
 
     def __init__(
@@ -442,7 +459,7 @@ class SqliteTable:
 
 
 def _in_sqlite(value: Value) -> Value:
-    """The value as SQLite gives it back: it has no NaN and no negative zero."""
+    """Return the value as SQLite gives it back: it has no NaN and no negative zero."""
     if type(value) is float:
         return None if math.isnan(value) else value + 0.0
     return value
@@ -457,7 +474,10 @@ TABLES: dict[str, Callable[..., Table]] = {
 
 
 def must_be_a_table(path: Path) -> None:
-    """ValueError if the name is not that of a table, ImportError without the library that writes it."""
+    """Check that the name is that of a table.
+
+    ValueError if it is not. ImportError without the library that writes the table.
+    """
     if path.suffix not in TABLES:
         raise ValueError(f"the name of a table must end in {', '.join(TABLES)}, not {path.name!r}")
     if path.suffix == ".parquet":
@@ -475,7 +495,10 @@ def _arrow() -> Any:
 
 
 def read_metadata(path: Path) -> dict[str, str]:
-    """The metadata of a table: the versions and the settings that wrote it, by name. ValueError if it is no table."""
+    """Return the metadata of a table by name: the versions and the settings that wrote it.
+
+    ValueError if the file is not a table.
+    """
     if path.suffix == ".parquet":
         with _opened_parquet(path) as dataset:
             return _texts(dataset.schema.metadata)
@@ -486,18 +509,21 @@ def read_metadata(path: Path) -> dict[str, str]:
 
 
 def _said(connection: sqlite3.Connection) -> dict[str, str]:
-    """The metadata of a database."""
+    """Return the metadata of a database."""
     return {str(name): str(value) for name, value in connection.execute("SELECT name, value FROM metadata")}
 
 
 def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
-    """The metadata of a Parquet schema."""
+    """Return the metadata of a Parquet schema."""
     found = (metadata or {}).items()
     return {name.decode(errors="replace"): value.decode(errors="replace") for name, value in found}
 
 
 def read_table(path: Path) -> list[Row]:
-    """The rows of a table of any kind, finished or not. OSError if there is no file, ValueError if it is no table."""
+    """Return the rows of a table of any kind, finished or not.
+
+    OSError if there is no file. ValueError if it is not a table.
+    """
     if path.suffix == ".parquet":
         with _opened_parquet(path) as dataset:
             _check_columns(path, dataset.schema.names)
@@ -515,7 +541,10 @@ def read_table(path: Path) -> list[Row]:
 
 
 def read_content(path: Path) -> Content:
-    """A table of any kind, finished or not, with all that is in it. Raises as `read_table` does."""
+    """Return a table of any kind, finished or not, with everything in it.
+
+    It raises the same errors as `read_table`.
+    """
     return _csv_content(path) if path.suffix == ".csv" else Content(read_metadata(path), read_table(path))
 
 

@@ -1,1 +1,1 @@
-"""Tables of the same scene compared: what was recorded, how far it may be off, and what has moved."""
+"""Comparison of tables of the same scene: the recorded values, the allowed differences, and what has moved."""

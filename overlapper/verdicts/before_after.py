@@ -1,4 +1,4 @@
-"""The page of a scene that has moved: its worst step as it was recorded and as it is today, side by side."""
+"""The page of a scene that has moved: its worst step as recorded and as it is today, side by side."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from overlapper.viewer import Recording
 from overlapper.viewer.page_text import filled
 from overlapper.whole_file import beside
 
-LIMIT = 3  # moves of a cause; what more there is, the terminal counts
+LIMIT = 3  # the most moves shown for a cause; the terminal counts the rest
 
 
 def save(verdict: Verdict, name: str, path: Path) -> Path:
@@ -42,14 +42,14 @@ def save(verdict: Verdict, name: str, path: Path) -> Path:
 
 
 def _dressed(before: Still | None, after: Still | None) -> Still | None:
-    """With today's names and colours, as a recorded step has none of its own."""
+    """The recorded step with today's names and colours, because a recording has none."""
     if before is None or after is None:
         return before
     return replace(before, names=before.names | after.names, colors=before.colors | after.colors)
 
 
 def _recording(stills: Sequence[tuple[Still, str]], tolerance: float) -> bytes:
-    """The frames, with their names, as a page of `overlapper.viewer`; the link `#t=1` opens the second."""
+    """The named frames as a page of `overlapper.viewer`. The link `#t=1` opens the second frame."""
     recording = Recording()
     for time, (still, name) in enumerate(stills):
         recording.add(still, still.contacts(tolerance), float(time), name)

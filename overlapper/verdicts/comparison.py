@@ -19,10 +19,11 @@ Names = Mapping[tuple[int, int], str]
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A quantity of a pair of shapes, or of one, that is further from what was recorded than its budget allows.
+    """A quantity of a pair of shapes, or of one shape, that is further from its recorded value than its budget allows.
 
-    `part` is the difference over what is allowed. Where there is nothing to subtract, as between two statuses, both are
-    infinite. Where no budget speaks of it, `allowed` is not a number, and `part` is in hundredths of what was recorded.
+    `part` is the difference divided by `allowed`. If nothing can be subtracted, as between two statuses, the difference
+    and `part` are infinite. If the quantity has no budget, `allowed` is NaN, and `part` is in hundredths of the
+    recorded value.
     """
 
     step: int
@@ -37,7 +38,7 @@ class Move:
     HEADS: ClassVar = ("step", "of", "quantity", "recorded", "today", "off by", "allowed", "times its budget")
 
     def cells(self) -> tuple[str, ...]:
-        """A line of a table below HEADS."""
+        """The cells of a row of the table with the heads HEADS."""
         figures = ("", "", "")
         if math.isfinite(self.difference):
             allowed = "" if math.isnan(self.allowed) else f"{self.allowed:.3g}"
@@ -56,10 +57,10 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Differences:
-    """`moves`: what is too far from what was recorded, by step and pair.
+    """`moves`: the quantities that are too far from their recorded values, by step and pair.
 
-    `spent`: the largest part of its budget that each quantity used up, 1 being all of it. `error_gain`: the sum of the
-    certified errors of the volumes over what it was when recorded, below 1 if they have become better.
+    `spent`: for each quantity, the largest part of its budget that was used; 1 is the whole budget. `error_gain`: the
+    sum of the certified errors of the volumes divided by the recorded sum; below 1 if the errors have become smaller.
     """
 
     moves: list[Move]
@@ -70,7 +71,7 @@ class Differences:
 def compare_measures(
     recorded: Sequence[Row], found: Sequence[Row], budgets: Mapping[str, Budget], names: Names | None = None
 ) -> Differences:
-    """Pairs and statuses must be those recorded, measures within their budgets, certified errors much the same."""
+    """Pairs and statuses must be as recorded, measures within their budgets, and certified errors similar."""
     names = names or {}
     old, new = (
         {(_step(row), *key(row)): row for row in rows if row["status"] != "alone"} for rows in (recorded, found)
@@ -96,11 +97,12 @@ def _measure_moves(
             was, now = _number(old, column), _number(new, column)
             part = budgets[name].spent(off_by(was, now), was)
             spent[name] = max(spent[name], part)
-            if not part <= 1:  # as it is for a value that is not a number
+            if not part <= 1:  # also true for NaN
                 allowed = budgets[name].allowed(was)
                 yield Move(_step(old), who, column, _text(was), _text(now), off_by(was, now), allowed, part)
-    # A bound is free to be within the budget of what it bounds. Beyond that ten times are allowed, for the bound of one
-    # pair depends on the order of operations: moving a scene multiplied one by 4.7, another way of cutting one by 14.
+    # An error bound may have any value within the budget of the volume. A larger bound may grow tenfold, because the
+    # bound of a pair depends on the order of operations. Moving a scene multiplied one bound by 4.7, and another way of
+    # cutting multiplied one by 14.
     was, now = (_number(row, "volume_error_m3") for row in (old, new))
     allowed = max(10 * was, budgets["volume"].allowed(_number(old, "volume_m3")) if "volume" in budgets else 0.0)
     if now > allowed:
@@ -111,9 +113,9 @@ def _measure_moves(
 def compare_forces(
     recorded: Sequence[Row], found: Sequence[Row], budgets: Mapping[str, Budget], names: Names | None = None
 ) -> Differences:
-    """Forces, torques and energies within their budgets, of the pairs in both that have any in one.
+    """Compare forces, torques and energies, for pairs that are in both tables and have forces in at least one.
 
-    Those without a budget may be anything.
+    Quantities without a budget are not compared.
     """
     names = names or {}
     old, new = ({(_step(row), *key(row)): row for row in rows} for rows in (recorded, found))
@@ -138,9 +140,9 @@ def compare_forces(
 def compare_poses(
     recorded: Sequence[Row], found: Sequence[Row], budgets: Mapping[str, Budget], names: Names | None = None
 ) -> Differences:
-    """How far each shape is from where it was recorded, in m, and how far turned, in rad; shapes of both are compared.
+    """Compare the poses of shapes that are in both tables: the distance from the recorded one in m, the angle in rad.
 
-    A quantity without a budget may be anywhere.
+    Quantities without a budget are not compared.
     """
     names = names or {}
     old, new = poses(recorded), poses(found)
@@ -150,7 +152,7 @@ def compare_poses(
         step, shape = k
         who = shape_label(shape, names)
         differences = {"position": 0.0, "orientation": 0.0}
-        # A link of many shapes has no pose. A pose that is missing or not a number on both sides is equal.
+        # A link of many shapes has no pose. Poses that are missing or NaN on both sides are equal.
         if not np.array_equal(old[k], new[k], equal_nan=True):
             differences["position"] = float(np.linalg.norm(new[k][:3] - old[k][:3]))
             differences["orientation"] = _angle(old[k][3:], new[k][3:])
@@ -165,13 +167,13 @@ def compare_poses(
 
 
 def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """The angle of the rotation from one unit quaternion to the other; exact to the last digits for small ones, too."""
+    """The angle of the rotation from one unit quaternion to the other. Small angles keep their relative accuracy."""
     less, more = sorted((float(np.linalg.norm(a - b)), float(np.linalg.norm(a + b))))
     return 4 * math.atan2(less, more)
 
 
 def loose_budgets(differences: Differences) -> list[str]:
-    """A sentence for each budget that is ten times what these differences need, if there are any at all."""
+    """A sentence for each budget that is ten times what these differences need. No sentence without differences."""
     loose = [
         f"the budget of {name} is {1 / most:.3g} times what is needed"
         for name, most in differences.spent.items()
@@ -183,7 +185,7 @@ def loose_budgets(differences: Differences) -> list[str]:
 
 
 def label(row: Row, names: Names) -> str:
-    """The pair of a row, by name where there is one, and by body/link/shape."""
+    """The pair of a row as text: names, where there are any, and body/link/shape."""
     return " and ".join(shape_label(shape, names) for shape in (key(row)[:3], key(row)[3:]))
 
 
@@ -199,13 +201,13 @@ def _step(row: Row) -> int:
 
 
 def _number(row: Row, column: str) -> float:
-    """A measure as a number; 0.0 where it has none, which is the same on both sides if the status is."""
+    """A measure as a number, 0.0 if it is missing. If the statuses are equal, it is missing on both sides."""
     value = row.get(column)
     return float(value) if value is not None else 0.0
 
 
 def off_by(was: float, now: float) -> float:
-    """The change of a measure. Not-a-number differs from every number, and not from itself."""
+    """The change of a measure. NaN differs from every number, but not from NaN."""
     return 0.0 if was == now or (math.isnan(was) and math.isnan(now)) else abs(now - was)
 
 

@@ -1,7 +1,7 @@
-"""The recording of a scene: the file, and how far a quantity may be from it.
+"""The recording of a scene: its expected file, and the allowed difference of each quantity.
 
-An expected file is a CSV table. It has the shapes, the poses and the measures of some steps of a scene, so that each
-can be told from the others when something has moved.
+An expected file is a CSV table. It has the shapes, the poses and the measures of some steps of a scene, so that each of
+the three can be compared separately.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from overlapper.tables.table import COLUMNS, Key, Row
 from overlapper.tables.table import FORCES as FORCE_COLUMNS
 from overlapper.tables.table_file import Content, CsvTable, read_content
 
-# How a comment begins that has shapes: the (body, link, shape) that have it, and the shape as text.
+# The beginning of a comment with shapes: each shape as text, and the (body, link, shape) that have it.
 SHAPES = "shapes "
 
-# A shape that meets no other has a row with the status "alone". Its columns of B and its measures are empty. By this
-# row every shape of a step has its pose, and a new pair is noticed.
+# A shape that meets no other has a row with the status "alone". Its columns of B and its measures are empty. So the
+# poses of all shapes of a step are in the file, and a new pair is noticed.
 EXPECTED_COLUMNS = [name for name in COLUMNS if name not in ("time_s", "nameA", "nameB", "fcl", "fcl_explanation")]
 
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """How far a quantity may be from what was recorded: `absolute` (SI units) + `relative` times the recorded one."""
+    """The allowed difference from a recorded value: `absolute` (SI units) + `relative` times the recorded value."""
 
     relative: float
     absolute: float
@@ -42,7 +42,7 @@ class Budget:
         return self.absolute + self.relative * abs(recorded)
 
     def spent(self, difference: float, recorded: float) -> float:
-        """The part of the budget that a difference uses up; above 1 is too far."""
+        """The part of the budget that a difference uses; above 1, the difference is too large."""
         if difference == 0:
             return 0.0
         allowed = self.allowed(recorded)
@@ -51,9 +51,9 @@ class Budget:
         return difference / allowed if allowed else math.inf
 
 
-# The budgets of a scene of polyhedra: five times what rounding did to the scenes when all their poses were moved by
-# less than a metre, which changed volumes by up to 2e-10 of themselves and centroids by up to 3e-12 m. A new file gets
-# what its own scene needs in place of these.
+# The default budgets of a scene of polyhedra: five times the effect of rounding when all poses of the scenes were moved
+# by less than a metre. Volumes changed by a relative 2e-10 at most, and centroids by 3e-12 m at most. A new file gets
+# budgets fitted to its own scene instead.
 ROUNDING = {
     "volume": Budget(1e-9, 0.0),
     "centroid": Budget(0.0, 1.5e-11),
@@ -62,15 +62,15 @@ ROUNDING = {
     "normal": Budget(0.0, 1e-12),
 }
 
-# How far shapes may be, in m and rad, from where they were recorded: more than another machine's sine moves what does
-# not depend on chance, and less than anyone would call the same grasp.
+# The allowed change of poses, in m and rad. It is larger than the effect of another machine's sine on motions that are
+# not chaotic, and small enough that a grasp is still the same.
 DRIFT = {"position": Budget(0.0, 1e-4), "orientation": Budget(0.0, 1e-3)}
 
-# How far forces, torques and energies of volumetric contact may be from those recorded: a hundredth, and where that is
-# next to nothing, what a gram weighs, on an arm of a centimetre and over a tenth of a millimetre.
+# The allowed change of forces, torques and energies of volumetric contact: a hundredth of the recorded value, plus the
+# weight of a gram, its torque on an arm of a centimetre, and its work over a tenth of a millimetre.
 FORCES = {"force": Budget(0.01, 0.01), "torque": Budget(0.01, 1e-4), "energy": Budget(0.01, 1e-6)}
 
-# When bodies have moved or are others, changes of the overlaps are told from a hundredth on.
+# If bodies have moved or have other shapes, changes of the overlaps above a hundredth are reported.
 HUNDREDTHS = {"volume": Budget(0.01, 0.0), "depth": Budget(0.01, 0.0)}
 
 
@@ -88,7 +88,7 @@ class Expected:
     stills: dict[int, Still] = field(default_factory=dict)
 
     def write(self, path: Path, origin: dict[str, str]) -> None:
-        """Write the file. Its first lines are for people to edit where the budgets do not fit."""
+        """Write the file. Users may edit the budgets in its first lines if these do not fit."""
         heading = {"steps": " ".join(map(str, self.steps)), "tolerance": repr(self.tolerance)}
         heading |= {
             f"budget {name}": f"relative {each.relative!r} absolute {each.absolute!r}"
@@ -101,7 +101,7 @@ class Expected:
             self._write_steps(table)
             table.close()
         except BaseException:
-            # A part of what is expected is of no use.
+            # An incomplete expected file is of no use.
             if left := table.leave():
                 left.unlink()
             raise
@@ -120,12 +120,12 @@ class Expected:
 
 
 def read_expected(path: Path) -> Expected:
-    """An expected file. FileNotFoundError if there is none, ValueError if it is not one, or not all of it is there."""
+    """Read an expected file. FileNotFoundError if it is missing, ValueError if it is invalid or incomplete."""
     return expected_in(read_content(path), path)
 
 
 def expected_in(content: Content, path: Path) -> Expected:
-    """The expected values in the content of the file at `path`. ValueError if it is no expected file."""
+    """The expected values in the content of the file at `path`. ValueError if it is not an expected file."""
     steps, tolerance = (content.metadata.get(name, "") for name in ("steps", "tolerance"))
     if not (re.fullmatch(r"[\d ]*\d", steps, re.ASCII) and re.fullmatch(r"[-+.e\d]+", tolerance, re.ASCII)):
         raise ValueError(f"{path} must say `# steps: <numbers>` and `# tolerance: <number>` in its first lines")
@@ -145,7 +145,7 @@ def has_shapes(content: Content) -> bool:
 
 
 def budgets_in(metadata: Mapping[str, str], path: Path) -> dict[str, Budget]:
-    """The budgets in the metadata of the table at `path`. ValueError if one is of no quantity."""
+    """The budgets in the metadata of the table at `path`. ValueError if a budget names no known quantity."""
     budgets: dict[str, Budget] = {}
     for heading, text in metadata.items():
         parts = re.fullmatch(r"relative (\S+) absolute (\S+)", text)
@@ -171,7 +171,7 @@ def _by_step(rows: Iterable[Row]) -> Iterator[tuple[int, list[Row]]]:
 
 
 def _stills(content: Content) -> dict[int, Still]:
-    """The shapes and poses of every step: a comment `shapes` holds for the rows below it, until another replaces it."""
+    """The shapes and poses of every step. A comment `shapes` is valid for the rows below it, up to the next one."""
     said = deque((above, text) for above, text in content.comments if text.startswith(SHAPES))
     known: dict[Key, Shape] = {}
     stills: dict[int, Still] = {}

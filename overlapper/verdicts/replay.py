@@ -1,4 +1,4 @@
-"""An expected file as today's simulation would write it, and as today's geometry measures it without a simulator."""
+"""Makes expected files from today's simulation, and measures recorded shapes and poses without a simulator."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from overlapper.tables.table import Row
 from overlapper.verdicts.comparison import compare_measures
 from overlapper.verdicts.expected import DRIFT, FORCES, ROUNDING, Budget, Expected
 
-# Where a scene is put to see how far rounding alone changes its measures, in m.
+# The displacements, in m, of a scene that show how much rounding alone changes its measures.
 ASIDES = ((0.3, 0.7, 0.1), (-0.2, 0.4, 0.9), (0.6, -0.5, -0.3))
 
 
@@ -22,12 +22,12 @@ def wanted(last_step: int, forces: bool) -> Expected:
 
 
 def observed(wanted: Expected, today: dict[int, Still]) -> Expected:
-    """The scene as it is `today`, with the steps, the tolerance and the budgets that are wanted."""
+    """The recording of the scene as it is `today`, with the steps, the tolerance and the budgets of `wanted`."""
     return replace(wanted, rows=measured(today, wanted.tolerance), stills=today)
 
 
 def fitted(made: Expected) -> Expected:
-    """With budgets of five times what rounding needs, to one digit; the others stay."""
+    """The recording with budgets of five times what rounding needs, to one digit. The other budgets stay."""
     needed = {
         name: Budget(*(float(f"{5 * part * each:.0e}") for each in (budget.relative, budget.absolute)))
         for name, part in rounding(made).items()
@@ -43,16 +43,16 @@ def measured(stills: Mapping[int, Still], tolerance: float) -> list[Row]:
 
 
 def rounding(expected: Expected) -> dict[str, float]:
-    """The largest part of each budget of a measure that rounding takes when all is moved by less than a metre."""
+    """The largest part of each budget that rounding uses when all bodies are moved by less than a metre."""
     spent = [compare_measures(expected.rows, replay(expected, aside), expected.budgets).spent for aside in ASIDES]
     return {name: max(each[name] for each in spent) for name in spent[0]}
 
 
 def replay(expected: Expected, moved_by: Sequence[float] = (0.0, 0.0, 0.0)) -> list[Row]:
-    """The rows that today's geometry makes of the shapes and poses of an expected file, without a simulator.
+    """Measure the shapes and poses of an expected file with today's geometry, without a simulator. Returns the rows.
 
-    With `moved_by`, in m, the bodies are moved before they are measured, and the rows are moved back. The differences
-    are rounding.
+    With `moved_by`, in m, the bodies are moved before they are measured, and the rows are moved back. Differences are
+    then due to rounding.
     """
     moved = {step: still.moved(moved_by) for step, still in expected.stills.items()}
     table = measured(moved, expected.tolerance)

@@ -1,7 +1,7 @@
 """The changes in a scene since it was recorded.
 
-Three things may move, and are told apart. The geometry is ours: the shapes and poses recorded, measured again. The
-shapes are the models', as they are read today. The dynamics are the simulator's: where it puts the shapes today.
+Three causes are distinguished. Geometry is this package: it measures the recorded shapes and poses again. Shapes come
+from the models, as they are read today. Dynamics come from the simulator: its poses of the shapes today.
 """
 
 from __future__ import annotations
@@ -32,11 +32,10 @@ from overlapper.verdicts.replay import measured, replay, rounding
 class Verdict:
     """The changes in a scene since it was recorded, by cause.
 
-    `geometry`: overlaps of the shapes and poses recorded, measured by today's package. `shapes`: shapes as today's
-    simulation has them. `dynamics`: poses of today's simulation, and forces of volumetric contact. `overlaps`: what has
-    become of the overlaps because of the last two, and empty if both are as recorded. `notes`: sentences about budgets
-    that do not fit, and about what is not modelled. `today` has the steps as they are today, `expected.stills` as they
-    were recorded.
+    `geometry`: overlaps of the recorded shapes and poses, measured by today's package. `shapes`: shapes of today's
+    simulation. `dynamics`: poses of today's simulation, and forces of volumetric contact. `overlaps`: changes of the
+    overlaps because of shapes and dynamics; empty if both are as recorded. `notes`: sentences about budgets that do not
+    fit, and about what is not modelled. `today` has the steps as they are today, `expected.stills` the recorded steps.
     """
 
     expected: Expected
@@ -49,17 +48,17 @@ class Verdict:
 
     @property
     def causes(self) -> dict[str, list[Move]]:
-        """The moves by cause: a verdict on each of the three."""
+        """The moves of each of the three causes."""
         return {"geometry": self.geometry, "shapes": self.shapes, "dynamics": self.dynamics}
 
     @property
     def moves(self) -> list[Move]:
-        """All that moved, the worst first; nothing, if all is as recorded."""
+        """All moves, the worst first; empty if everything is as recorded."""
         return sorted((move for moves in self.causes.values() for move in moves), key=lambda move: -move.part)
 
     @property
     def worst_step(self) -> int:
-        """The step of the worst move: of the largest one that can be measured, or else of the first."""
+        """The step of the worst move: the largest move with a finite size, or else the first move."""
         measured = [move for move in self.moves if math.isfinite(move.part)]
         return (measured or self.moves)[0].step
 
@@ -82,7 +81,7 @@ class Verdict:
 
 
 def examine(expected: Expected, today: dict[int, Still], last_step: int) -> Verdict:
-    """Compare a scene as it is `today`, by step, with what was recorded; it ends with `last_step`."""
+    """Compare a scene as it is `today`, by step, with its recording. Its last step is `last_step`."""
     names = {link: name for still in today.values() for link, name in still.names.items()}
     geometry = compare_measures(expected.rows, replay(expected), expected.budgets, names)
     placed = [row for step, still in today.items() for row in still.placements(step)]
@@ -115,7 +114,7 @@ def left_out(stills: Mapping[int, Still]) -> list[str]:
 def _shape_moves(
     before: dict[int, Still], today: dict[int, Still], last_step: int, names: dict[tuple[int, int], str]
 ) -> list[Move]:
-    """The shapes that are not those recorded, each in the first step where it is so."""
+    """The shapes that differ from the recorded shapes, each in the first step where it differs."""
     moves: dict[str, Move] = {}
     for step, recorded in before.items():
         if step not in today:
@@ -137,7 +136,7 @@ def _described(shape: Shape | None) -> str:
 
 
 def _notes(geometry: Differences, shaken: dict[str, float], dynamics: Differences) -> list[str]:
-    """Which budgets do not fit: ten times too wide for what moves and for rounding, or too narrow for rounding."""
+    """Sentences on budgets that do not fit: ten times wider than moves and rounding need, or narrower than rounding."""
     needed = {name: max(part, shaken[name]) for name, part in geometry.spent.items()}
     if not dynamics.moves:
         needed |= dynamics.spent

@@ -1,4 +1,4 @@
-"""Cameras that show what moves and what overlaps, from the side where most of the largest overlap is seen.
+"""Cameras that show moving and overlapping bodies, from the side where most of the largest overlap is seen.
 
 Half-spaces, and bodies of one link that are far larger than all others, are grounds. No view is made to fit a ground.
 """
@@ -18,11 +18,11 @@ from overlapper.viewer.labels import DrawnBodies, DrawnContact, key_of
 from overlapper.viewer.look import FIELD_OF_VIEW, Array
 from overlapper.viewer.tessellation import bounded
 
-GROUND = 30.0  # times as large as all other bodies: a ground. The plane of pybullet is a ground for bodies under 9 m.
+GROUND = 30.0  # a ground is this many times larger than all other bodies: pybullet's plane, if these are under 9 m.
 BACK = np.array([0.60, -0.68, 0.42]) / np.linalg.norm([0.60, -0.68, 0.42])  # the usual way to the camera
 TURNS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180])  # of BACK about z
 NOWHERE = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
-STILL = 1e-3  # of the scene's size: a smaller motion is none
+STILL = 1e-3  # of the scene's size: smaller motions are ignored
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,10 @@ class View:
 
 
 class Framing:
-    """The views of all moments seen so far. The first moment says which bodies are grounds, and the size of the others.
+    """The views of all moments seen so far. The first moment defines which bodies are grounds, and the scene's size.
 
-    `center` and `size` are those of the box around all others, m; `largest` is the largest overlap that was seen, and
-    `moment` says when, counted from 0: -1 without any.
+    `center` and `size` are those of the box around all bodies but grounds, m. `largest` is the largest overlap so far.
+    `moment` is the number of its moment, counted from 0; -1 if there is no overlap.
     """
 
     def __init__(self, bodies: DrawnBodies) -> None:
@@ -62,7 +62,7 @@ class Framing:
         self.largest: Overlap | None = None
         self.moment = -1
         self._moments = 0
-        self._first: dict[tuple[int, int, int], Array] = {}  # the boxes in the first moment that had them
+        self._first: dict[tuple[int, int, int], Array] = {}  # the boxes of shapes when they were first seen
         self._then: list[tuple[int, Array]] = []  # bodies and their boxes at the moment of the largest overlap
         self._taking_part: set[int] = set()  # bodies in an overlap at that moment
         self._moved: set[int] = set()
@@ -102,17 +102,17 @@ class Framing:
         self._moments += 1
 
     def opening(self) -> View:
-        """The view of all that moves and overlaps; if nothing moves, of the bodies that overlap."""
+        """The view of all moving and overlapping bodies. If nothing moves, the view of the overlapping bodies."""
         if self._moved:
             boxes = [box for key, box in self._first.items() if key[0] in self._moved]
-            # A body that moved away since does not count; a body in an overlap at that moment does.
+            # Moving bodies in an overlap at the moment of the largest overlap are framed there, too.
             boxes += [box for body, box in self._then if body in self._moved & self._taking_part]
         else:
             boxes = [box for key, box in self._first.items() if key[0] in self._met]
         return View.of([*boxes, *self._shared.values()] or self._all(), self.side())
 
     def whole(self) -> View:
-        """The view of all but grounds."""
+        """The view of all bodies except grounds."""
         return View.of([*self._all(), *self._shared.values()], self.side())
 
     def _all(self) -> list[Array]:
@@ -152,7 +152,7 @@ def _sizes(boxes: Iterable[tuple[tuple[int, int, int], Array]]) -> dict[int, flo
 
 
 def _ground_size(bodies: DrawnBodies) -> float:
-    """The size, m, from which a body is a ground: bodies of one link, so many times larger than all smaller bodies."""
+    """The size, m, from which a body is a ground: one link, and GROUND times larger than all smaller bodies."""
     jointed = {body for body, link, _ in bodies.keys if link >= 0}
     sizes = sorted(((size, body) for body, size in _sizes(_boxes(bodies)).items()), reverse=True)
     found = np.inf

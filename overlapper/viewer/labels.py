@@ -13,7 +13,7 @@ Pair = tuple[str, str]
 LinkName = tuple[str, str]  # body and link
 Key = tuple[int, ...]  # bodyA, linkA, shapeA, bodyB, linkB, shapeB
 
-# meshcat's tree and panel look names up in JavaScript objects, which have these names from the start. "<object>" is
+# meshcat's tree and panel look names up in JavaScript objects, which have these names by default. "<object>" is
 # meshcat's name for the drawing at a node.
 INHERITED = {"__proto__", "constructor", "hasOwnProperty", "isPrototypeOf", "propertyIsEnumerable", "toLocaleString"}
 INHERITED |= {f"__{way}{kind}__" for way in ("define", "lookup") for kind in ("Getter", "Setter")}
@@ -53,7 +53,7 @@ class DrawnContact(Protocol):
 
 
 def link_names(bodies: DrawnBodies) -> dict[tuple[int, int], tuple[str, str]]:
-    """The names of body and link in the tree, without slashes, as a slash begins a new level."""
+    """The names of body and link in the tree. They have no slashes, as a slash begins a new level."""
     names = {}
     for (body, link), name in bodies.names.items():
         first, _, rest = name.partition("/")
@@ -62,7 +62,7 @@ def link_names(bodies: DrawnBodies) -> dict[tuple[int, int], tuple[str, str]]:
 
 
 def _unlike(name: str) -> str:
-    """The name, in quotes if JavaScript objects have it from the start, or if it begins and ends with a quote."""
+    """The name, in quotes if JavaScript objects have it by default, or if it begins and ends with a quote."""
     return f"'{name}'" if name in INHERITED or name[:1] == name[-1:] == "'" else name
 
 

@@ -1,8 +1,8 @@
 """A live view of bodies and their overlaps in meshcat.
 
 Each overlap is drawn after the bodies, so that none of them tints it, with an arrow and a line. The arrow starts at the
-centroid and points along `normal`, the way that pushes the first shape out of the second; the line is the patch
-outline. Both shine through everything. The arrow is as long as a fixed part of the scene, so that an overlap of a
+centroid and points along `normal`, the direction that pushes the first shape out of the second. The line is the
+patch outline. Both shine through everything. The arrow is as long as a fixed part of the scene, so that an overlap of a
 millimetre between bodies of a metre is still found. In meshcat's tree the bodies are
 `/overlapper/bodies/<body>/<link>/<shape>` and the overlaps `/overlapper/overlaps/<a>-<b>/<volume>`. Where there are
 forces, overlaps are coloured by pressure, and arrows are `/overlapper/forces/<scale>/<a>-<b>/<force>`; the scale says
@@ -36,9 +36,9 @@ FORCES = "/overlapper/forces"
 class Viewer:
     """A live view of a simulation: call `show` after each step.
 
-    A visualizer that is passed in keeps its own camera, lights and background. Without one a meshcat server is started,
-    whose address is `url`, and the bodies of the first `show` are framed. `close`, or the end of a `with` block, stops
-    the server. It is seen on this machine only, unless `host` is another of its addresses, or "0.0.0.0" for all.
+    A visualizer that is passed in keeps its own camera, lights and background. Otherwise a meshcat server is started at
+    the address `url`, and the bodies of the first `show` are framed. `close`, or the end of a `with` block, stops the
+    server. The view is visible only on this machine, unless `host` is another address of it, or "0.0.0.0" for all.
     """
 
     def __init__(

@@ -2,8 +2,8 @@
 
 Bodies are drawn by their collision shapes, translucent and in their own colours. Each facet of an overlap has the
 colour of the shape whose surface it lies on: orange for the first of the pair, sky blue for the second. They are from
-the palette of Okabe and Ito, which the common kinds of colour blindness keep apart. The bodies' own colours would say
-less, for in many models everything is white or grey.
+the palette of Okabe and Ito, so that readers with common kinds of colour blindness can tell them apart. The bodies' own
+colours would say less, as in many models everything is white or grey.
 """
 
 from __future__ import annotations

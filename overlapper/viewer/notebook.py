@@ -54,6 +54,6 @@ def _numbers(overlap: Overlap) -> Iterator[tuple[str, str]]:
 
 
 def _vector(values: Array) -> str:
-    """A value that is but rounding beside the others is written 0."""
+    """The values as text. A value that is only rounding error beside the others is written 0."""
     least = 1e-12 * float(abs(values).max())
     return ", ".join(f"{value if abs(value) > least else 0.0:.4g}" for value in values)

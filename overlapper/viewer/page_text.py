@@ -1,4 +1,4 @@
-"""The text of a page: a template that is filled, and a policy that lets it run its own scripts and load nothing."""
+"""The text of a page: a filled template, and a policy that allows only the page's own scripts and no loading."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ POLICY = (
 
 
 def filled(template: Path, texts: Mapping[str, str], frames: str = "") -> str:
-    """The template with a text in the place of each {{mark}}, and the policy in that of {{policy}}.
+    """The template with a text in place of each {{mark}}, and the policy in place of {{policy}}.
 
-    Marks within texts are not replaced. `frames` is a page that this one opens within itself, bound by both policies.
+    Marks within texts are not replaced. `frames` is a page embedded in this page. Both policies apply to it.
     """
     page = re.sub(r"\{\{(\w+)\}\}", lambda mark: texts.get(mark[1], mark[0]), template.read_text(encoding="utf-8"))
     hashes = dict.fromkeys(_hash(script) for text in (page, frames) for script in _scripts(text))

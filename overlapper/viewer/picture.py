@@ -1,7 +1,7 @@
 """A picture of bodies and their overlaps as a PNG, drawn without a browser or a display.
 
-The camera, the light and the colours are those of a recording. Faces are painted with the nearest in front at every
-pixel: bodies first, then overlaps, then arrows. matplotlib draws lines and letters.
+The camera, the light and the colours are those of a recording. At every pixel the nearest face is in front. Bodies are
+painted first, then overlaps, then arrows. matplotlib draws lines and letters.
 """
 
 from __future__ import annotations
@@ -66,10 +66,10 @@ def save(
     framing: Framing | None = None,
     forces: Forces | None = None,
 ) -> Path:
-    """Draw the bodies where they are, the overlapping pairs among `contacts` and their `forces`; returns the path.
+    """Draw the bodies where they are, the overlapping pairs among `contacts` and their `forces`. Returns the path.
 
-    With `close`, the camera comes near the largest overlap. `looks` are those of the bodies and of the overlaps.
-    A `framing` that has seen other moments knows what moves. Without one, the bodies that overlap are framed.
+    With `close`, the camera is near the largest overlap. `looks` are those of the bodies and of the overlaps. A
+    `framing` that has seen other moments knows the moving bodies. Without a framing, the overlapping bodies are framed.
     """
     contacts = list(contacts)
     here = Framing(bodies)
@@ -144,7 +144,7 @@ class _Picture:
                 self._add_lines(each, self.camera.seen(points), on)
 
     def _seen_faces(self, faces: Faces, points: Array) -> tuple[Array, Array]:
-        """The triangles (k, 3, 3) that are seen from their side, in the camera's frame, and their colours (k, 4)."""
+        """The triangles (k, 3, 3) that face the camera, in the camera's frame, and their colours (k, 4)."""
         facets = triangles(faces.facets)
         corners = points[facets]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -1,7 +1,8 @@
 """Forces as they are drawn: pressures as colours, and an arrow for each pair of links.
 
 A pressure is stiffness times the extent of the overlap along the direction of the pressures. The colours are viridis.
-They differ as much as their values do, for colour-blind readers, too, and higher pressures are lighter.
+Differences of colour are in proportion to differences of value, for colour-blind readers, too. Higher pressures are
+lighter.
 """
 
 from __future__ import annotations
@@ -128,7 +129,7 @@ def colors(pressure: Array, top: float) -> Array:
 
 
 def usual(values: Sequence[float], weights: Sequence[float]) -> float:
-    """The value below which four fifths of the weights lie; 0 without weights. So a few large values do not count."""
+    """The value below which four fifths of the weights lie; 0 without weights. A few large values have no effect."""
     if not len(values) or not sum(weights):
         return 0.0
     order = np.argsort(values)
@@ -159,7 +160,7 @@ class Scale:
         return cls(float(unit), rounded_up(force * unit / length, range(1, 11)), rounded_up(top))
 
     def suits(self, force: float, top: float, length: float) -> bool:
-        """True if usual forces and pressures are neither too large nor too small for it, or if there are none."""
+        """True if usual forces and pressures are neither too large nor too small for it, or there are none."""
         drawn = force * self.length / self.force
         return not force or (length / 6 <= drawn <= 1.5 * length and self.top / 12 <= top <= 1.5 * self.top)
 

@@ -1,4 +1,4 @@
-"""The one description of what is drawn of bodies, overlaps and forces: faces, lines and dots.
+"""The common description of drawn bodies, overlaps and forces: faces, lines and dots.
 
 Live views, pages, pictures and notebooks draw these. Lengths are in metres, colours are red, green and blue in 0..1.
 """
@@ -41,7 +41,7 @@ FRONT, BACK, BOTH = 0, 1, 2  # the sides from which a face is seen, as three.js 
 class Primitive:
     """`color` (3,), or one of each point; `strength`, one of each point, multiplies the opacity.
 
-    A higher `order` is drawn later. What is drawn `through` everything is not hidden by what is in front of it.
+    Primitives with a higher `order` are drawn later. With `through`, nothing in front hides the primitive.
     """
 
     points: Array
@@ -58,7 +58,7 @@ class Primitive:
 class Faces(Primitive):
     """Convex `facets`, rings of indices, counter-clockwise from outside, over `points` (n, 3).
 
-    A face shows `glow` times its colour in the dark, and in full light `lit` times its colour besides; by default its
+    A face shows `glow` times its colour in the dark. Full light adds `lit` times its colour. By default a face has its
     own colour in any light.
     `normals` (n, 3) are the directions to shade by; None if facets are flat.
     """
@@ -70,7 +70,7 @@ class Faces(Primitive):
     side: int = FRONT
 
     def shade(self, normals: Array) -> Array:
-        """How much is seen (...) of the colour of faces with these unit normals (..., 3) in the world."""
+        """The fraction (...) of their colour that faces with these unit normals (..., 3) in the world show."""
         shade: Array = self.glow + self.lit * (AMBIENT + DIFFUSE * np.maximum(normals @ LIGHT, 0))
         return shade
 
@@ -97,14 +97,14 @@ class Drawing:
         self._known: dict[bytes, Tessellation] = {}
 
     def ground(self, placed: Placed) -> Ground | None:
-        """The part of a ground that is drawn, in the frame of its shape; None of any other shape."""
+        """The part of a ground that is drawn, in the frame of its shape; None for any other shape."""
         if not self._is_ground(placed):
             return None
         back = np.append(-placed.orientation[:3], placed.orientation[3])
         return ground(placed.shape, rotated(back, self.center - placed.position), self.size)
 
     def body(self, placed: Placed, color: Sequence[float]) -> list[Primitive]:
-        """The shape in its own frame. Primitives that are not visible are there, too, so that a page can show them."""
+        """The shape in its own frame. Invisible primitives are included, so that a page can show them."""
         look, own = self._bodies, np.array(color[:3])
         if seen := self.ground(placed):
             return _plane(seen, look)
@@ -158,7 +158,7 @@ class Drawing:
             if look.opacity < 1:
                 back = channels(look.back) if look.back else 0.5 * own
                 drawn.append(skin(color=back, side=BACK, order=0.5))
-            # Mostly of its own light, so that the owner is known from the shaded side, too.
+            # Faces glow, so that the colour of the owner is also seen on the shaded side.
             drawn.append(skin(color=own, glow=0.4, lit=0.7, order=1))
         return drawn
 

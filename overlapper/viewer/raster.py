@@ -1,4 +1,4 @@
-"""Triangles painted from far to near at every pixel, so that bodies that go through each other are seen right.
+"""Triangles painted from far to near at every pixel, so that bodies that go through each other are drawn correctly.
 
 A ray leaves the camera through each pixel. Three planes contain the camera and a side of a triangle; the ray meets the
 triangle if it is on the inner side of all three. This holds for corners behind the camera, too, so nothing is clipped.
@@ -71,8 +71,8 @@ def _band(spans: Indices, planes: Array, colors: NDArray[np.float32], top: int, 
     a, b, c = planes[triangle].T
     nearness = (a * column + b * row + c).astype(np.float32)
     ray = (row - top) * columns + column
-    # One sort by ray, by nearness, whose bits are in the order of its values, and by triangle: if two are equally near,
-    # the later one is in front.
+    # One sort by ray, by nearness and by triangle. The bits of nearness are in the order of its values. If two
+    # triangles are equally near, the later triangle is in front.
     bits = np.uint64(len(colors).bit_length())
     near = (nearness.view(np.uint32) >> np.uint32(7)).astype(np.uint64)  # 24 bits: as fine as 1/65,536
     keys = np.sort((ray.astype(np.uint64) << np.uint64(24) | near) << bits | triangle.astype(np.uint64))

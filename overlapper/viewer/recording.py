@@ -59,7 +59,7 @@ from meshcat import Visualizer  # isort: skip  # after the stage, which says wha
 from meshcat.servers.zmqserver import VIEWER_ROOT  # isort: skip
 from meshcat.transformations import translation_matrix  # isort: skip
 
-# The scripts of the page, each after those that it needs.
+# The scripts of the page, each after the scripts that it needs.
 SCRIPTS = ("film", "scene", "forces", "look", "numbers", "camera", "chart", "list", "panels", "time")
 ASPECTS = (0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0)
 ARRAYS = {"float32": "Float32Array", "uint32": "Uint32Array", "int32": "Int32Array", "uint16": "Uint16Array"}
@@ -68,18 +68,18 @@ ARRAYS |= {"int16": "Int16Array", "uint8": "Uint8Array"}
 
 # Columns and their bits: volume; its error, whose first digit is shown; depth, area and centroid; normal.
 NUMBERS = [(slice(0, 1), 17), (slice(1, 2), 6), (slice(2, 7), 17), (slice(7, 10), 14)]
-# The same of force, torque, energy and slip; direction of the pressures; stiffness.
+# The same for force, torque, energy and slip; direction of the pressures; stiffness.
 PRESSES = [(slice(0, 6), 17), (slice(6, 9), 14), (slice(9, 10), 17)]
 UNPRESSED = (0.0,) * 10
 
 
 class Recording:
-    """A run as one self-contained HTML file with a time slider; made without a server, read without a network.
+    """A run as one self-contained HTML file with a time slider. It is made without a server and read without a network.
 
-    The page shows one recorded frame at a time and never a mixture of two, so the bodies drawn are those that made the
-    overlaps drawn. `recording.html#t=0.25` opens at that time, paused; `#t=0.25&from=1,0,1&at=0,0,0.5` with the camera
-    at one point of the world and turned to another; `#t=0.25&pair=cup,hand` with the numbers of that pair. About 30
-    frames a second are enough to look at.
+    The page shows one recorded frame at a time and never a mixture of two. The bodies drawn are therefore those of the
+    overlaps drawn. `recording.html#t=0.25` opens at that time, paused. `#t=0.25&from=1,0,1&at=0,0,0.5` also puts the
+    camera at the point `from`, and turns it to the point `at`. `#t=0.25&pair=cup,hand` also shows the numbers of that
+    pair. About 30 frames per second are enough for a smooth view.
     """
 
     def __init__(self, bodies: Look = BODIES, overlaps: Look = OVERLAPS) -> None:
@@ -116,10 +116,10 @@ class Recording:
         name: str = "",
         forces: Forces | None = None,
     ) -> None:
-        """Record the bodies where they are now and the overlapping pairs among `contacts`, with the `forces` of these.
+        """Record the bodies where they are now and the overlapping pairs among `contacts`, with their `forces`.
 
-        `time` in seconds must increase from call to call; the page counts from the first. Frames with a `name` are no
-        moments of one run: the page shows their names in the place of times.
+        `time` in seconds must increase from call to call, and the page counts from the first. Frames with a `name` are
+        not moments of one run: the page shows the names instead of the times.
         """
         if not isinstance(time, Real):
             raise TypeError(f"time must be a number of seconds, not {time!r}")
@@ -133,7 +133,7 @@ class Recording:
             raise ValueError(f"time must increase from frame to frame: {time} s came no later than the frame before")
         self._times.append(seconds)
         self._names.append(name)
-        for each in getattr(bodies, "skipped", ()):  # bodies that are not of a simulation have none
+        for each in getattr(bodies, "skipped", ()):  # bodies outside a simulation have no `skipped`
             self._left_out[f"{each.name}, {each.reason}"] = None
         colors = bodies.colors
         places = {
@@ -165,7 +165,7 @@ class Recording:
         return f"Recording({len(self._times)} frames{until}, {len(self._pairs)} pairs)"
 
     def save(self, path: str | Path) -> Path:
-        """Write what was added so far to one HTML file, and return its path."""
+        """Write the frames added so far to one HTML file, and return its path."""
         text = self._page(Path(path).stem)
         with beside(path) as file:
             file.write_text(text, encoding="utf-8")
@@ -251,7 +251,7 @@ class Recording:
         }
 
     def _add_body(self, stage: Stage, path: str, placed: Placed, color: Sequence[float]) -> str:
-        """The node of the body; a new body is drawn."""
+        """The node of the body. A new body is drawn."""
         shape = pickle.dumps(placed.shape)
         drawn, node = self._bodies.get(path, (None, path))
         if drawn != shape:
@@ -287,7 +287,7 @@ class Recording:
 
 @dataclass
 class _Polytopes:
-    """Facets by vertices and owners. If only the vertices have moved since, their motions are kept instead."""
+    """Facets by vertices and owners. If only the vertices have moved, their motions are kept instead."""
 
     frames: list[tuple[float, ...]] = field(default_factory=list)  # middle, and the unit: half the longest side
     previous: list[int] = field(default_factory=list)  # the polytope that vertices are counted from, or -1
@@ -299,9 +299,10 @@ class _Polytopes:
     )  # normal, and offset from the middle in units, of each facet
 
     def add(self, overlap: Overlap, center: Array, like: int, slack: int) -> int:
-        """Keep the overlap, about `center`; `like` is the one that the pair had before, or -1. Returns its number.
+        """Keep the overlap, about `center`. `like` is the earlier polytope of the pair, or -1. Returns its number.
 
-        Round overlaps have a `slack` above 1: they are drawn within a tenth, so vertices are 1/1000 of the size fine.
+        Round overlaps have a `slack` above 1. They are drawn to within a tenth, so 1/1000 of the size is fine enough
+        for vertices.
         """
         lower, upper = np.asarray(overlap.bounds)
         unit = float((upper - lower).max()) / 2
@@ -335,9 +336,9 @@ class _Polytopes:
 
 
 class _Tape:
-    """Takes the place of meshcat's window, and keeps the commands instead of sending them to a server.
+    """Replaces meshcat's window, and keeps the commands instead of sending them to a server.
 
-    A geometry that is used again is kept by its uuid alone.
+    A geometry that is used again is kept only by its uuid.
     """
 
     def __init__(self, commands: list[str]) -> None:
@@ -381,9 +382,9 @@ def _facet_planes(overlap: Overlap, middle: Array, unit: float) -> NDArray[np.fl
 def _look_alike(a: Overlap, b: Overlap, slack: int) -> bool:
     """True if the drawing of one overlap can stand for the other.
 
-    Neither shape has moved by more than 1/200 of the size of what they share, a pixel where that fills a quarter of the
-    page. Nor has its volume or area changed by more than 3 %, as it may in a thin overlap. Both are multiplied by
-    `slack`.
+    Neither shape has moved by more than 1/200 of the overlap's size. This is one pixel if the overlap fills a quarter
+    of the page. Volume and area have changed by at most 3 %, which matters for thin overlaps. `slack` multiplies both
+    limits.
     """
     changed = max(abs(b.volume / a.volume - 1), abs(b.area / a.area - 1))
     if changed >= 0.03 * slack:

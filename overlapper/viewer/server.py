@@ -1,6 +1,6 @@
 """The meshcat server of a live view, in a process of its own.
 
-It is seen at one address of the machine, while meshcat's own server listens on all of them.
+It listens on one address of the machine, while meshcat's own server listens on all addresses.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from meshcat.visualizer import ViewerWindow
 
 
 def must_be_here(host: str) -> None:
-    """ValueError unless `host` is an address of this machine."""
+    """Raises ValueError unless `host` is an address of this machine."""
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         with closing(socket.create_server((host, 0), family=family)):
@@ -45,7 +45,7 @@ class Window(ViewerWindow):  # type: ignore[misc]
 
 
 class _Bridge(ZMQWebSocketBridge):  # type: ignore[misc]
-    """It accepts drawings from this machine only, wherever it is seen."""
+    """It accepts drawings only from this machine, whatever address it is viewed at."""
 
     def __init__(self, seen_by: str) -> None:
         self._seen_by = seen_by

@@ -1,4 +1,4 @@
-"""The drawing as objects of meshcat, and the room around them. Lengths are in metres, z is up."""
+"""The drawing as objects of meshcat, and the room around them. Lengths are in metres, and z is up."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Stage:
         return Group(primitives, buffers=self._known[shape])
 
     def overlap(self, overlap: Overlap, press: Press | None = None, scale: Scale | None = None) -> Group:
-        """An overlap by its owners; with the forces of the pair and a scale, by its pressures."""
+        """An overlap, coloured by owners, or by pressures if the forces of the pair and a scale are given."""
         coarse = to_draw(overlap, self.size)
         return Group(self.drawing.overlap(coarse, press, scale), np.asarray(coarse.centroid))
 
@@ -92,7 +92,7 @@ def set_room(visualizer: Any, view: View) -> None:
 
 
 class Group(geometry.Object):  # type: ignore[misc]
-    """Primitives in one node of the tree, about a position, m; with `buffers`, their geometries are known."""
+    """Primitives in one node of the tree, about a position, m. `buffers` are their known geometries."""
 
     def __init__(
         self, primitives: Sequence[Primitive], position: Array = ORIGIN, buffers: Sequence[_Buffers] = ()
@@ -109,7 +109,7 @@ class Group(geometry.Object):  # type: ignore[misc]
     def lower(self) -> dict[str, Any]:
         lowered = [each.lower() for each in self._objects]
         for each, more in zip(lowered, self._more):
-            del each["object"]["matrix"]  # the identity, which three.js would take instead of the position
+            del each["object"]["matrix"]  # the identity, which three.js would use instead of the position
             each["object"] |= more
         return {
             "metadata": {"version": 4.5, "type": "Object"},
@@ -124,7 +124,7 @@ def _once(elements: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _material(primitive: Primitive) -> geometry.Material:
-    """The material is "transparent" even if opaque, as three.js draws transparent objects in the order asked for."""
+    """The material is "transparent" even if opaque, as three.js draws transparent objects in the requested order."""
     painted = primitive.color.ndim > 1
     properties: dict[str, Any] = {
         "transparent": True,

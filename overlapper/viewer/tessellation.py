@@ -1,4 +1,4 @@
-"""Triangles and lines to draw shapes, meshes and grounds by, in their own frames."""
+"""Triangles and lines that draw shapes, meshes and grounds, in their own frames."""
 
 from __future__ import annotations
 

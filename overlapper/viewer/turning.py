@@ -1,7 +1,7 @@
 """A picture that turns, as SVG: bodies by their silhouettes, and every facet of what they share.
 
-The camera is far away, so that lines stay lines. What bodies share is convex: no facet turned to the camera hides
-another one. Corners of polygons move from one of so many STEPS to the next, in any browser and without a script.
+The camera is far away, so that lines stay lines. The overlap is convex, so no facet that faces the camera hides another
+facet. The corners of polygons move from each of the STEPS to the next, in any browser and without a script.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ STEPS = 24  # of a turn
 ABOVE = np.deg2rad(25)  # the horizon
 AROUND = 48  # corners of a silhouette
 NEAR = 2.5  # times half the size of the overlap: how much is seen to each side
-LEAST = 1e-150  # m, the least half height of a picture, which is divided by
+LEAST = 1e-150  # m, the least half height of a picture: coordinates are divided by it
 EDGES = 200  # of a body: more edges would hide it, and are not drawn
 COARSE = 0.05  # the tolerance of round overlaps, as every facet is written STEPS times
 GROUND = 0.9  # times half the height: the size of the scene, which sets how far planes are drawn
@@ -63,7 +63,7 @@ def turning(overlap: Overlap) -> str:
 
 
 def _framed(overlap: Overlap) -> tuple[Array, float]:
-    """The middle of the picture, and how far above and below it is seen, m."""
+    """The middle of the picture, and its half height, m."""
     bodies = [np.asarray(each.bounds) for each in overlap.shapes if facts(each.shape).bounded]
     lower, upper = around([np.asarray(overlap.bounds)] if overlap else bodies)
     reach = float(np.linalg.norm(upper - lower)) / 2
@@ -94,7 +94,7 @@ def _body(drawing: Drawing, placed: Placed, color: Array, screen: _Screen) -> It
 
 
 def _outermost(screens: Array) -> Array:
-    """The points (s, AROUND, 2) that lie farthest in so many directions among points (s, n, 2) of each screen."""
+    """The farthest points (s, AROUND, 2) in AROUND directions among the points (s, n, 2) of each screen."""
     angles = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
     farthest = (screens @ np.array([np.cos(angles), np.sin(angles)])).argmax(axis=1)
     return np.take_along_axis(screens, farthest[:, :, None], axis=1)

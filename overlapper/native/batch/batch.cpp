@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Rows are made in stretches, with a look for Ctrl-C after each: memory for some millions of rows takes seconds.
+/// Rows are made in blocks, with a check for Ctrl-C after each block: memory for some millions of rows takes seconds.
 constexpr size_t kStretch = 1 << 17;
 
 /// Results of a pair, kept for its next call.
@@ -235,7 +235,8 @@ void Batch::Memory::place(std::span<const double> positions, std::span<const dou
   poses = std::move(now);
 }
 
-/// The pairs whose boxes meet. Calls with named pairs skip this: boxes take longer than moving the bodies.
+/// The pairs whose boxes meet. Calls with named pairs skip this search, because boxes take longer than moving the
+/// bodies.
 void Batch::Memory::find_pairs(std::vector<IndexPair>& pairs) {
   for (size_t i = 0; i < bodies.size(); ++i)
     if (std::exchange(enclosed[i], bodies[i].version) != bodies[i].version) enclosures[i] = enclosure(bodies[i].placed);
@@ -251,8 +252,8 @@ void Batch::Memory::begin(std::span<const IndexPair> pairs) {
   before.reserve(pairs.size()), done.reserve(pairs.size());
 }
 
-/// Lays out rows for more pairs, and finds these pairs in the last call. If both lists are sorted it walks along both,
-/// else it looks at the same index.
+/// Lays out rows for more pairs, and finds these pairs in the last call. If both lists are sorted, it walks along both
+/// lists. Otherwise it looks at the same index.
 void Batch::Memory::recall(std::span<const IndexPair> pairs) {
   for (const IndexPair& pair : pairs) {
     while (both_sorted && walked < known.size() && known[walked].pair < pair) ++walked;
@@ -264,7 +265,7 @@ void Batch::Memory::recall(std::span<const IndexPair> pairs) {
   done.resize(next_known.size());
 }
 
-/// Fills row i; false if that took long.
+/// Fills row i; false if this took long.
 bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   Known& pair = next_known[i];
   if (before[i] >= 0) {

@@ -120,8 +120,8 @@ inline constexpr std::tuple kColumns{
                  [](const Overlaps::Row& row) { return static_cast<char>(overlapper::widened(row.measures.way)); },
                  "(p,) True where the volume was computed again in wider arithmetic."}};
 
-/// The pairs of moving shapes. Results of the last call are reused where they prove the same answer. Several threads
-/// may call it at once: one uses the memory, the others work without it.
+/// The pairs of moving shapes. Results of the last call are reused if they prove the same answer. Several threads may
+/// call it at once. One thread uses the memory, and the others work without it.
 class Batch {
  public:
   explicit Batch(std::vector<Shape> shapes);

@@ -63,7 +63,7 @@ bool for_each_in_parallel(size_t count, int threads, const Work& work) {
   for (int t = 1, wanted = working; t <= wanted; ++t) try {
       others.emplace_back(help, t);
     } catch (const std::system_error&) {
-      // No more threads are available: the present ones do the work.
+      // No more threads are available, so the present threads do the work.
       const std::scoped_lock lock(mutex);
       working -= wanted - t + 1;
       break;

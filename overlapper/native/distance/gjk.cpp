@@ -8,7 +8,7 @@
 namespace overlapper {
 namespace {
 
-/// `b` is a half-space. If `a` is one, too, its plane is parallel, and all points of it are as near.
+/// `b` is a half-space. If `a` is also a half-space, its plane is parallel, and all of its points are equally near.
 Distance distance_to_half_space(const Placed& a, const Placed& b) {
   const Plane plane = b.pose * *only_plane(b.shape);
   const Plane* parallel = only_plane(a.shape);

@@ -71,8 +71,8 @@ class NearPolytope {
   const WideBody& body_;
   WideVector about_;
   std::vector<Vec3> local_;
-  /// The corner farthest from the contact. Without it, the corners that are kept would give a direction into the body
-  /// the reach of the contact alone.
+  /// The corner farthest from the contact. Without it, the reach in a direction into the body would be only that of the
+  /// kept corners at the contact.
   std::optional<NearCorner> opposite_;
 };
 

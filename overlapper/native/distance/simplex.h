@@ -105,8 +105,8 @@ inline bool weigh(const WideVector& a, const WideVector& b, const WideVector& c,
   return std::ranges::none_of(weight, [](DoubleDouble w) { return w.head < 0; });
 }
 
-/// Exact signs prove better that the origin is inside than a face, edge or corner onto which rounding has put it.
-/// Without exact signs, the fewest corners are the better proof.
+/// Exact signs prove that the origin is inside. A face, edge or corner onto which rounding has put the origin is a
+/// weaker proof. Without exact signs, the fewest corners are the better proof.
 template <class Vector>
 inline constexpr bool kInsideIsExact = std::is_same_v<Vector, Vec3>;
 

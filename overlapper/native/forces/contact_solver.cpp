@@ -11,7 +11,7 @@ namespace {
 /// Sweeps end when no slip changes by more than this fraction of the largest slip without forces.
 constexpr double kSettled = 1e-8;
 
-/// The most visits of patches in a step; the number of sweeps stays between kFewest and kMost.
+/// The most visits of patches in a step. The number of sweeps stays between kFewest and kMost.
 constexpr int kVisits = 10000;
 constexpr int kFewest = 10;
 constexpr int kMost = 2000;
@@ -40,7 +40,7 @@ ContactSolver::Six ContactSolver::Row::local(const Screw& of) const {
           {overlapper::dot(along, of.along), overlapper::dot(across, of.along), overlapper::dot(normal, of.about)}};
 }
 
-// -------------------------------------------------------------------------------------------------------- where it is
+// ------------------------------------------------------------------------------------------------------------ placing
 
 const ContactSolver::Known* ContactSolver::known(std::int64_t key) const {
   const auto at = std::ranges::lower_bound(known_, key, {}, &Known::key);
@@ -60,7 +60,7 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
   rows_.reserve(patches_.size());
   std::vector<double> of_body(bodies_.bodies().size());
   for (ElasticPatch& patch : patches_) {
-    // A patch that has no direction now is pushed in its last direction.
+    // A patch without a direction is pushed in its last direction.
     if (const Known* last = patch.area > 0 ? nullptr : known(patch.key)) patch.normal = last->normal;
     Row& row = rows_.emplace_back(patch);
     add_sides(row, patch);
@@ -101,7 +101,7 @@ void ContactSolver::add_sides(Row& row, const ElasticPatch& patch) {
   }
 }
 
-/// The motion that a wrench gives to its point of application on a body of one link. Both have the sign of the side.
+/// The motion that a wrench on a body of one link gives to its point of application. Both have the sign of the side.
 ContactSolver::Screw ContactSolver::answer(const Side& side, const Screw& wrench) const {
   const Mobility& mobility = mobilities_[side.body];
   return {mobility.linear * wrench.along, mobility.angular * (wrench.about + cross(side.arm, wrench.along))};
@@ -154,7 +154,7 @@ void ContactSolver::add_side(Row& row, int number, std::span<const double> jacob
       }
 }
 
-// -------------------------------------------------------------------------------------------------------- what it does
+// ------------------------------------------------------------------------------------------------------------- solving
 
 ContactSolver::Six ContactSolver::slip_of(const Row& row, std::span<const double> velocity) const {
   Six slip;
@@ -203,7 +203,7 @@ ContactSolver::Six ContactSolver::known_wrench(size_t patch) const {
   return last ? rows_[patch].local(last->wrench) : Six{{std::max(0.0, patches_[patch].force), 0, 0}, {}};
 }
 
-/// Updates pressures first, then friction, whose limit is the pressures. Returns by how much the slip has changed.
+/// Updates pressures first, then friction, because pressures limit friction. Returns the change of the slip.
 double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const {
   const Row& row = rows_[patch];
   const Six slip = slip_of(row, velocity), last = laws.wrench;

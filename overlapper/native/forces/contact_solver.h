@@ -14,12 +14,13 @@
 namespace overlapper {
 
 struct PatchForce {
-  Vec3 force, torque;  ///< N and N m, on a, about the centroid of the volume; on b the opposite
-  Vec3 slip;           ///< m/s: the velocity of a over b that is left there, along the patch
+  Vec3 force, torque;  ///< N and N m, on a, about the centroid of the volume; the opposite acts on b
+  Vec3 slip;           ///< m/s: the remaining velocity of a over b there, along the patch
 };
 
-/// The forces of patches on bodies within one step, implicit in the velocities at its end: pressures by a rule that
-/// keeps energy, friction by Coulomb's law, solved patch by patch until nothing changes (projected Gauss–Seidel).
+/// The forces of patches on bodies within one step, implicit in the velocities at its end. Pressures follow a rule that
+/// keeps energy. Friction follows Coulomb's law. Patches are solved one by one until nothing changes (projected
+/// Gauss–Seidel).
 class ContactSolver {
  public:
   explicit ContactSolver(std::vector<TreeLink> links) : bodies_(std::move(links)) {}
@@ -27,22 +28,22 @@ class ContactSolver {
   const Multibodies& bodies() const { return bodies_; }
   std::span<const ElasticPatch> patches() const { return patches_; }
 
-  /// Takes the places of links and patches. Returns for each patch the square of a frequency, in (rad/s)²: no swing of
-  /// the patch's bodies on all of their patches is faster.
+  /// Takes the poses of links, and the patches. Returns for each patch the square of a frequency, in (rad/s)². No
+  /// oscillation of the patch's bodies on all of their patches is faster.
   std::vector<double> place(std::span<const Pose> frames, std::vector<ElasticPatch> patches);
 
   struct Step {
     double duration;                       ///< s
     std::span<const double> velocity;      ///< of all coordinates, at the beginning
     std::span<const double> acceleration;  ///< without the patches
-    std::span<const char> damped;          ///< by patch: whether to choose stability over energy (backward Euler)
+    std::span<const char> damped;          ///< per patch: whether to choose stability over energy (backward Euler)
     Friction friction = Friction::kEllipsoid;
   };
 
   struct Solution {
     std::vector<PatchForce> patches;
-    std::vector<std::array<Vec3, 2>> links;  ///< force and torque, about its centre of mass, on each
-    std::vector<double> acceleration;        ///< by the patches, of all coordinates
+    std::vector<std::array<Vec3, 2>> links;  ///< force and torque on each link, about its centre of mass
+    std::vector<double> acceleration;        ///< of all coordinates, by the patches
     int sweeps = 0;
   };
 
@@ -50,23 +51,23 @@ class ContactSolver {
   Solution solve(const Step& step);
 
  private:
-  /// A force with the torque, or a velocity with the angular velocity, about the same point, in the world.
+  /// A force and a torque, or a velocity and an angular velocity, about the same point, in the world.
   struct Screw {
     Vec3 along, about;
   };
 
-  /// A screw in the frame of a patch. The part of pressures is along the normal and about two axes in the plane; the
-  /// part of friction is along these axes and about the normal.
+  /// A screw in the frame of a patch. The part of the pressures is along the normal and about two axes in the plane.
+  /// The part of friction is along these axes and about the normal.
   struct Six {
     Three normal{}, tangential{};
   };
 
-  /// The part of one body in the velocity of a over b, and the answers of its coordinates to a wrench.
+  /// One body's part in the velocity of a over b, and the responses of its coordinates to a wrench.
   struct Side {
     int body, first, coordinates;
     bool moves;
-    bool single;     ///< a body of one link: it has a sign and an arm, other bodies have rows and answers
-    double sign;     ///< 1 of a, -1 of b
+    bool single;     ///< a body of one link: it has a sign and an arm; other bodies have rows and answers
+    double sign;     ///< 1 for a, -1 for b
     Vec3 arm;        ///< m, from its centre of mass to the centroid
     size_t rows;     ///< in `pool_`: 6 rows of so many coordinates
     size_t answers;  ///< in `pool_`: so many rows of 6; unused if the body does not move
@@ -92,7 +93,7 @@ class ContactSolver {
     Mat3 angular;       ///< 1/(kg m²), in the world
   };
 
-  /// The laws of a patch in a step, and its wrench as it is so far.
+  /// The laws of a patch in a step, and its present wrench.
   struct Laws;
 
   void add_sides(Row& row, const ElasticPatch& patch);
@@ -106,7 +107,7 @@ class ContactSolver {
   Solution solved(std::span<const Laws> laws, std::span<const double> velocity) const;
   void remember(const Solution& solution);
 
-  /// The solution of a patch, with which the next step begins.
+  /// The solution of a patch, as a start for the next step.
   struct Known {
     std::int64_t key;
     Vec3 normal;

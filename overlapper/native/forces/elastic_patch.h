@@ -16,14 +16,14 @@ struct ElasticPatch {
   double force = 0;          ///< N, at rest
   double stiffness = 0;      ///< Pa/m
   double dissipation = 0;    ///< s
-  double friction = 0;       ///< coefficient of
-  double area = 0;           ///< m²; 0 of a patch without direction, whose force does not change with the depth
-  Vec3 centre;               ///< m, of that area
-  Mat3 moments{{}, {}, {}};  ///< m⁴, of that area about its centre
-  double distance = 0;       ///< m, mean, of that area's points from the centroid
+  double friction = 0;       ///< coefficient of friction
+  double area = 0;           ///< m²; 0 for a patch without a direction, whose force does not depend on the depth
+  Vec3 centre;               ///< m, of this area
+  Mat3 moments{{}, {}, {}};  ///< m⁴, of this area about its centre
+  double distance = 0;       ///< m: mean distance of this area's points from the centroid
 };
 
-/// The area of a patch in its plane, by two axes through the centroid of the volume.
+/// The area of a patch in its plane, along two axes through the centroid of the volume.
 struct PlaneArea {
   PlaneArea(const ElasticPatch& patch, Vec3 along, Vec3 across);
 
@@ -32,7 +32,7 @@ struct PlaneArea {
   double uu, uv, vv;  ///< m²: the mean products of the coordinates of its points about the centre
   double distance;    ///< m: the mean distance of its points from the centroid
 
-  /// The answer of a foundation of that stiffness to a motion along the normal and about both axes, in N/m, N and N m.
+  /// The response of a foundation of this stiffness to motion along the normal and about both axes, in N/m, N and N m.
   ThreeByThree foundation(double stiffness) const;
 };
 

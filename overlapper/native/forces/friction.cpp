@@ -47,8 +47,8 @@ static_assert(
 Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, double& shift) {
   if (!(limit > 0) || dot(slip, slip) == 0) return {};
   if (!(mobility[0][0] + mobility[1][1] + mobility[2][2] > 0)) return (-limit / std::sqrt(dot(slip, slip))) * slip;
-  // The force is -(mobility + shift)⁻¹ slip, and the slip that is left is -shift times the force. Newton's method on
-  // the inverse of the force's size finds the shift, if any (Moré and Sorensen 1983).
+  // The force is -(mobility + shift)⁻¹ slip, and the remaining slip is -shift times the force. Newton's method on the
+  // inverse of the force's size finds the shift, if there is one (Moré and Sorensen 1983).
   constexpr double kClose = 1e-12;
   Three force{};
   double size = 0;
@@ -85,9 +85,9 @@ void PatchFriction::spread(const PlaneArea& area) {
       points_.push_back({c * x - s * y, s * x + c * y, share});
       reach += share * std::hypot(area.u + points_.back().u, area.v + points_.back().v);
     }
-  // The mean distance of the points is stretched to that of the area, which makes the resistance to a spin right.
+  // The mean distance of the points is scaled to that of the area. The resistance to a spin is then right.
   const double stretch = distance_ > 0 && reach > 0 ? distance_ / reach : 1;
-  // The pressure is linear over the patch, its centre is the centroid, and it is nowhere below zero.
+  // The pressure is linear over the patch and never negative. Its centre is the centroid.
   const double least = 1e-9 * mean, uu = area.uu + least, vv = area.vv + least, square = uu * vv - area.uv * area.uv;
   const double slope_u = square > 0 ? (area.uv * area.v - vv * area.u) / square : 0;
   const double slope_v = square > 0 ? (area.uv * area.u - uu * area.v) / square : 0;
@@ -122,7 +122,7 @@ Three PatchFriction::answer(const Three& slip, const Three& last, double force) 
 Three PatchFriction::at_points(Three slip, double limit) {
   Three sum{};
   for (Point& point : points_) {
-    // The slip at the point, from that of the patch, and the change of that slip by forces at the point.
+    // The slip at the point, from the slip of the patch; and the change of the point's slip by forces at the point.
     const auto there = [&](const Three& of) { return Three{of[0] - point.v * of[2], of[1] + point.u * of[2], 0}; };
     const Three by_u = mobility_ * Three{1, 0, -point.v}, by_v = mobility_ * Three{0, 1, point.u};
     const Three uu = there(by_u), vv = there(by_v);

@@ -8,23 +8,25 @@
 
 namespace overlapper {
 
-/// The law of friction: one law for the slip and the spin of a patch together, or Coulomb's at points spread over it.
+/// The law of friction: one law for slip and spin of a patch together, or Coulomb's law at points spread over the
+/// patch.
 enum class Friction { kEllipsoid, kDistributed };
 
-/// The force of at most `limit` that ends the slip. If no such force does, the force has that size and opposes the slip
-/// that is left: it takes away the most energy of all forces within the limit (Coulomb's law). The slip is `slip`
-/// without the force; `mobility`, symmetric and positive, times the force is added to it. The slip that is left is
-/// -`shift` times the force. A guess of `shift`, as from a similar problem, is replaced by the answer.
+/// The force of at most `limit` that ends the slip. If no such force ends it, the force has the size `limit` and
+/// opposes the remaining slip. It takes away the most energy of all forces within the limit (Coulomb's law). `slip` is
+/// the slip without the force. The force changes it by `mobility` times the force; `mobility` is symmetric and
+/// positive. The remaining slip is -`shift` times the force. `shift` may hold a guess, as from a similar problem; the
+/// answer replaces it.
 Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, double& shift);
 
 /// The friction of a patch in a step: forces along two axes in the plane, and a torque about the normal through the
 /// centroid of the volume.
 class PatchFriction {
  public:
-  /// `mobility` times such forces is the change of the slip within the step.
+  /// `mobility` times the forces of friction is the change of the slip within the step.
   PatchFriction(double coefficient, const PlaneArea& area, const ThreeByThree& mobility, Friction kind);
 
-  /// Begins with known forces, as far as this law can have them, and returns them.
+  /// Begins with known forces, limited to those that this law allows, and returns them.
   Three begin(const Three& known);
 
   /// The forces at the end of the step. `slip` includes the effect of `last`, the last answer; pressures push with

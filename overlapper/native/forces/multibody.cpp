@@ -22,7 +22,7 @@ int coordinates_of(Joint joint) {
   return 0;
 }
 
-/// Inverts the symmetric matrix in place by Cholesky's method. A coordinate that has no mass stays where it is.
+/// Inverts the symmetric matrix in place by Cholesky's method. A coordinate without mass does not move.
 void invert(std::vector<double>& m, int n) {
   const auto at = [&](int i, int j) -> double& { return m[size_t(i) * n + j]; };
   double largest = 0;
@@ -157,7 +157,7 @@ void Multibodies::find_inverse_mass(int number) {
     if (!(link.mass > 0)) continue;
     jacobian(i, frames_[i].translation, rows);
     const Mat3& turn = frames_[i].rotation;
-    // Angular rows become components along the principal axes, times the roots of the moments.
+    // Maps angular rows to components along the principal axes, times the roots of the moments.
     for (int c = 0; c < n; ++c) {
       const Vec3 spin{rows[size_t(3) * n + c], rows[size_t(4) * n + c], rows[size_t(5) * n + c]};
       const Vec3 own = apply_transposed(turn, spin);
@@ -174,7 +174,7 @@ void Multibodies::find_inverse_mass(int number) {
       }
   }
   if (!(links_[body.first_link].mass > 0)) {
-    // The base is held, and the mass matrix of the joints is inverted by itself.
+    // The base is held, so the mass matrix of the joints is inverted alone.
     const int joints = n - kOfBase;
     std::vector<double> own(size_t(joints) * joints);
     for (int i = 0; i < joints; ++i)

@@ -13,17 +13,17 @@ enum class Joint { kHeld, kRevolute, kPrismatic, kSpherical };
 /// A link and the joint that moves it in its parent. Frames are inertial frames: at the centre of mass, along the
 /// principal axes.
 struct TreeLink {
-  int parent = -1;  ///< its place among all links, before this one; -1 of a base, with which a body begins
+  int parent = -1;  ///< number of its parent, less than its own; -1 for a base, with which a body begins
   Joint joint = Joint::kHeld;
   Vec3 axis;   ///< unit, in the frame of the parent; a spherical joint turns about the axes of the link's own frame
   Vec3 pivot;  ///< m, in the frame of the parent: a point that the joint does not move
-  double mass = 0;  ///< kg; of a base, 0 if nothing moves it
+  double mass = 0;  ///< kg; 0 for a base that nothing moves
   Vec3 inertia;     ///< kg m², principal
 };
 
-/// Bodies of links, and their coordinates of velocity. A body has six coordinates of its base, linear at the centre of
-/// mass and angular, in the world; then those of its joints, in the order of their links. A base that is held has its
-/// six, too, as it may be moved by hand.
+/// Bodies of links, and their velocity coordinates. A body has six coordinates of its base, in the world: linear at the
+/// centre of mass, and angular. The coordinates of its joints follow, in the order of their links. A fixed base also
+/// has six coordinates, because it may be moved by hand.
 class Multibodies {
  public:
   struct Body {
@@ -39,22 +39,22 @@ class Multibodies {
   int body_of(int link) const { return body_[link]; }
   int coordinates() const { return coordinates_; }
 
-  /// Takes the places of the links, and finds the inverse mass matrices there.
+  /// Takes the poses of the links, and finds the inverse mass matrices there.
   void place(std::span<const Pose> frames);
 
   Vec3 centre(int link) const { return frames_[link].translation; }
 
-  /// Writes 6 rows: the linear velocity of the point of a link, then its angular velocity, by its body's coordinates.
+  /// Writes 6 rows: the linear velocity of a link's point, then its angular velocity, per coordinate of its body.
   void jacobian(int link, Vec3 point, std::span<double> rows) const;
 
-  /// The linear velocity of the centre of mass of a link, and its angular velocity, by the velocity of all coordinates.
+  /// The linear velocity of a link's centre of mass, and its angular velocity, from the velocities of all coordinates.
   std::array<Vec3, 2> twist(int link, std::span<const double> velocity) const;
 
   /// The inverse mass matrix by rows; zeros for coordinates that forces do not move.
   std::span<const double> inverse_mass(int body) const { return inverse_mass_[body]; }
 
  private:
-  /// A coordinate of a joint, in the world.
+  /// A joint coordinate, in the world.
   struct Moving {
     bool turns;
     Vec3 axis, pivot;
@@ -64,11 +64,11 @@ class Multibodies {
 
   std::vector<TreeLink> links_;
   std::vector<Body> bodies_;
-  std::vector<int> body_;                ///< of each link
-  std::vector<std::vector<int>> moved_;  ///< of each link: the coordinates of the joints between it and its base
+  std::vector<int> body_;                ///< per link
+  std::vector<std::vector<int>> moved_;  ///< per link: the coordinates of the joints between it and its base
   int coordinates_ = 0;
   std::vector<Pose> frames_;
-  std::vector<Moving> moving_;  ///< per coordinate of all bodies; coordinates of bases are not used
+  std::vector<Moving> moving_;  ///< per coordinate of all bodies; not used for bases
   std::vector<std::vector<double>> inverse_mass_;
 };
 

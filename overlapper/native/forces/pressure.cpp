@@ -9,7 +9,7 @@ namespace {
 /// The centre of pressure stays within this many squared radii of gyration: the border of a rectangle, on its axes.
 constexpr double kReach2 = 3;
 
-/// The part of the step that the velocity goes ahead by in the pressure at the end.
+/// The pressure at the end of the step includes the velocity times this part of the step.
 double ahead(Rule rule) { return rule == Rule::kKeeping ? 0.25 : 1; }
 
 }  // namespace
@@ -39,13 +39,13 @@ Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const Three
   const ThreeByThree foundation = area.foundation(patch.stiffness);
   const double lead = ahead(rule) * duration;
   response_ = (lead + patch.dissipation) * foundation;
-  // Backward Euler is of the velocity at the end, the other rule of how it changes.
+  // Backward Euler depends on the velocity at the end only. The other rule depends on the change of the velocity.
   const Three known = (rule == Rule::kKeeping ? lead : 0) * (foundation * before);
   rest_ = Three{patch.force, 0, 0} + known;
   ThreeByThree matrix = duration * (response_ * mobility);
   for (int i = 0; i < 3; ++i) matrix[i][i] += 1;
   implicit_ = inverse(matrix);
-  // A line has one radius of gyration, and the other one must not be zero.
+  // A line has only one radius of gyration; the other radius must not be zero here.
   const double least = 1e-9 * (area.uu + area.vv), uu = area.uu + least, vv = area.vv + least, uv = area.uv;
   const double square = uu * vv - uv * uv;
   in_radii_ = {vv / square, -uv / square, uu / square};
@@ -56,8 +56,8 @@ Three Pressure::answer(const Three& slip) const {
   const Three asked = implicit_ * target;
   const double force = asked[0];
   if (!(area_.area > 0)) return {std::max(0.0, force), 0, 0};
-  // Torques without a force have their centre infinitely far away. A force below zero may be due to torques that the
-  // patch cannot give, and be above zero without them.
+  // Torques without a force have their centre infinitely far away. A negative force may come from torques that the
+  // patch cannot give. The force may be positive without these torques.
   const double share = std::max(0.0, force);
   const double x = -asked[2] - share * area_.u, y = asked[1] - share * area_.v;
   const double far = in_radii_[0] * x * x + 2 * in_radii_[1] * x * y + in_radii_[2] * y * y;

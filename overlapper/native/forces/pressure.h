@@ -5,27 +5,27 @@
 
 namespace overlapper {
 
-/// The rule by which pressures follow the depth within a step. kKeeping keeps the energy of a swing and is stable for
-/// steps of any length; kDamping is backward Euler.
+/// The rule by which pressures follow the depth within a step. kKeeping keeps the energy of an oscillation, and is
+/// stable for steps of any length. kDamping is backward Euler.
 enum class Rule { kKeeping, kDamping };
 
 /// The pressures of a patch in a step: a force along the normal, and torques about two axes in the plane through the
 /// centroid of the volume.
 class Pressure {
  public:
-  /// `before` is the slip at the beginning of the step; `mobility` times pressures is the change of the slip in 1 s.
+  /// `before` is the slip at the beginning of the step. `mobility` times pressures is the change of the slip in 1 s.
   Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, const Three& before,
            double duration, Rule rule);
 
-  /// The pressures, if `slip` is the slip at the end of the step without them. They push, and their centre stays on the
-  /// area.
+  /// The pressures. `slip` is the slip at the end of the step without them. Pressures push, and their centre stays on
+  /// the area.
   Three answer(const Three& slip) const;
 
  private:
   PlaneArea area_;
   ThreeByThree mobility_, response_, implicit_;
   Three rest_;
-  Three in_radii_;  ///< by u², uv and v²: a squared distance from the centre, in radii of gyration
+  Three in_radii_;  ///< coefficients of u², uv and v²: squared distance from the centre, in radii of gyration
   double duration_;
 };
 

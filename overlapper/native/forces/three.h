@@ -4,8 +4,8 @@
 
 namespace overlapper {
 
-/// Three coordinates of a force or a velocity of a patch: along its normal and about two axes in its plane, or along
-/// these axes and about the normal.
+/// Three coordinates of a force or a velocity of a patch. They are along its normal and about two axes in its plane, or
+/// along these axes and about the normal.
 using Three = std::array<double, 3>;
 using ThreeByThree = std::array<Three, 3>;
 

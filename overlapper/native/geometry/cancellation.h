@@ -7,16 +7,16 @@
 
 namespace overlapper {
 
-/// Thrown at a cancellation point once nobody waits for the answer any more.
+/// Thrown at a cancellation point once no caller waits for the answer.
 struct Cancelled {};
 
 namespace cancellation {
 
-/// Answers whether the caller that waits on this thread still wants its answer. The bindings set this once; without it,
-/// answers are always wanted.
+/// Whether the caller that waits on this thread still wants its answer. The bindings set this once. Without it, answers
+/// are always wanted.
 inline bool (*still_wanted)() = nullptr;
 
-/// On a thread that helps another: a flag that is true once the other's answer is not wanted any more.
+/// On a helper thread: a flag that is true once the answer of the other thread is no longer wanted.
 inline constinit thread_local const std::atomic<bool>* given_up = nullptr;
 
 inline constexpr int kPointsBetween = 64;  ///< which take a millisecond at most
@@ -40,14 +40,14 @@ inline void look_at_clock() {
 
 }  // namespace cancellation
 
-/// A place where a computation may end early: one in each loop that may take a tenth of a second and more. The question
-/// may run a signal handler that computes something itself. So no place is where a thread_local of the core is in use,
-/// but for the memory that a Scratch has lent.
+/// A place where a computation may end early. There is one in each loop that may take a tenth of a second or more. The
+/// question may run a signal handler that computes something itself. No cancellation point is therefore at a place
+/// where a thread_local of the core is in use, except for the memory of a Scratch.
 inline void cancellation_point() {
   if (--cancellation::points_left <= 0) cancellation::look_at_clock();
 }
 
-/// The same in a loop whose rounds look at so many elements each.
+/// The same in a loop that looks at so many elements in each round.
 inline void cancellation_point(size_t elements) {
   cancellation::points_left -= static_cast<int>(std::min<size_t>(elements / 256, cancellation::kPointsBetween));
   cancellation_point();

@@ -13,7 +13,7 @@
 namespace overlapper {
 namespace {
 
-/// The point farthest from `origin` along `measure`, by the largest value that `measure(point)` takes.
+/// The number of the point with the largest `measure(point)`.
 template <class Measure>
 int farthest(std::span<const Vec3> points, Measure measure) {
   int best = 0;
@@ -30,8 +30,8 @@ Vec3 flushed(Vec3 p, double negligible) {
   return {keep(p.x), keep(p.y), keep(p.z)};
 }
 
-/// Four points that span a solid, roughly as large as possible, counter-clockwise seen from the fourth's far side;
-/// false if none do.
+/// Four points that span a solid, roughly as large as possible, counter-clockwise seen from the far side of the fourth
+/// point. False if there are none.
 bool extreme_tetrahedron(std::span<const Vec3> points, std::array<int, 4>& corner) {
   if (points.size() < 4) return false;
   const Vec3 first = points[0];
@@ -45,7 +45,7 @@ bool extreme_tetrahedron(std::span<const Vec3> points, std::array<int, 4>& corne
 
   const auto side = [&](int d) { return orientation(a, points[corner[1]], points[corner[2]], points[d]); };
   int sign = side(corner[3]);
-  // Rounding may pick a point in the plane although another lies just off it.
+  // Rounding may select a point in the plane although another point lies just off the plane.
   for (int d = 0; sign == 0 && d < static_cast<int>(points.size()); ++d) {
     sign = side(d);
     if (sign != 0) corner[3] = d;
@@ -162,7 +162,7 @@ bool ExpandingHull::assemble(std::span<const std::array<int, 3>> triangles) {
     g.neighbour[t.number] = s.facet;
     if (sees(s.facet, g.vertex[(t.number + 2) % 3]) || sees(t.facet, f.vertex[(s.number + 2) % 3])) return false;
   }
-  // A convex solid has the surface of a sphere, the only surface in one piece whose Euler characteristic is 2.
+  // A convex solid has the surface of a sphere. It is the only connected surface with Euler characteristic 2.
   std::vector<char> met(facets.size(), false), used(points.size(), false);
   std::vector<int> stack{0};
   met[0] = true;
@@ -189,7 +189,7 @@ bool ExpandingHull::sees(int facet, int p) const {
   const Facet& f = facets[facet];
   const Vec3 w = points[p] - points[f.vertex[0]];
   const double det = dot(f.normal, w);
-  // The static filter of orientation(), with the facet's share of it computed once.
+  // The static filter of orientation(). The facet's part of it is computed once.
   const double error = 8 * 0x1p-53 * dot(f.normal_rounding, abs(w));
   if (det > error) return true;
   if (det < -error) return false;
@@ -280,8 +280,9 @@ int ExpandingHull::fan_facet_that_sees(int p, size_t base) const {
   const auto facet = [&](size_t k) { return fan_[(base + k) % size]; };
   if (sees(facet(0), p)) return facet(0);
   if (sees(facet(size - 1), p)) return facet(size - 1);
-  // The planes through the apex, the first corner of the horizon and its k-th turn about the line of the two by less
-  // than half a turn from the first facet to the last, so that `p`, behind both, lies between two of them.
+  // Consider the planes through the apex, the first corner of the horizon and its k-th corner. From the first facet to
+  // the last, they turn by less than half a turn about the line of the first two points. `p` is behind both facets, so
+  // it lies between two of these planes.
   const std::array<int, 3>& corner = facets[facet(0)].vertex;
   const Vec3 first = points[corner[0]], apex = points[corner[2]];
   const auto side = [&](size_t k) { return orientation(first, points[facets[facet(k)].vertex[0]], apex, points[p]); };
@@ -296,10 +297,10 @@ int ExpandingHull::fan_facet_that_sees(int p, size_t base) const {
   const size_t between = last_with([](int s) { return s <= 0; });
   if (sees(facet(between), p)) return facet(between);
   if (side(between) < 0) return -1;
-  // On one of the planes, which several corners of the horizon may share.
+  // `p` is on one of the planes. Several corners of the horizon may share this plane.
   const size_t before = last_with([](int s) { return s < 0; });
   if (sees(facet(before), p)) return facet(before);
-  // On the line: before the first corner, or behind the apex.
+  // `p` is on the line: before the first corner, or behind the apex.
   const bool on_line = side(1) == 0 && side(size - 1) == 0;
   return on_line && base == 0 ? fan_facet_that_sees(p, size / 2) : -1;
 }
@@ -321,7 +322,8 @@ int ExpandingHull::cone_facet_that_sees(int p) const {
   const int facet = fan_facet_that_sees(p, 0);
   assert(facet >= 0 || first_that_sees(cone_, p) < 0);
   if (facet < 0) return -1;
-  // The facet that a point waits with decides the numbers of later facets: it is the first of all but very large cones.
+  // The facet that a point waits with determines the numbers of later facets. It is the first facet that sees the
+  // point, except in very large cones.
   constexpr size_t kMostInOrder = 512;
   const int first = first_that_sees(std::span(cone_).first(std::min(cone_.size(), kMostInOrder)), p);
   return first < 0 ? facet : first;
@@ -329,8 +331,8 @@ int ExpandingHull::cone_facet_that_sees(int p) const {
 
 void ExpandingHull::hand_on_to_cone(int apex) {
   order_cone();
-  // A point that saw a removed facet and is still outside sees one of the cone: at the horizon, the plane of a cone
-  // facet lies between the planes of the two facets that met there.
+  // A point that saw a removed facet, and is still outside, sees a facet of the cone. At the horizon, the plane of a
+  // cone facet lies between the planes of the two facets that met there.
   for (int gone : removed_)
     hand_on_conflicts(gone, apex, [&](int p) {
       const int facet = cone_facet_that_sees(p);
@@ -342,7 +344,7 @@ bool ExpandingHull::rises_above_facet(int facet, int p, double fraction) const {
   const Facet& f = facets[facet];
   const auto [a, b, c] = f.vertex;
   const Vec3 rise = points[p] - points[a];
-  // As in sees(), and for the facet's distance from the origin alike.
+  // As in sees(), and the same for the facet's distance from the origin.
   const double rounding = 8 * 0x1p-53 * dot(f.normal_rounding, abs(rise) + fraction * abs(points[a]));
   const double excess = dot(f.normal, rise) - fraction * std::max(0.0, dot(f.normal, points[a]));
   if (std::abs(excess) > rounding) return excess > 0;
@@ -376,14 +378,15 @@ bool ExpandingHull::build(std::span<const double> negligible) {
     }
     const int apex = facets[facet].farthest_conflict;
     if (!negligible.empty() && !rises_above(facet, apex, negligible[apex])) {
-      // The hull only grows, so what is negligible now stays so.
+      // The hull only grows, so a negligible point stays negligible.
       hand_on_conflicts(facet, apex, [&](int p) { wait(facet, p); });
       continue;
     }
     insert(apex, facet);
     hand_on_to_cone(apex);
     vacate_removed();
-    // The number of a removed facet may still wait for its turn. A new facet that has the number has had a turn itself.
+    // A removed facet's number may still be in the queue. If a new facet reuses the number, the new facet has already
+    // had its turn.
     pending.insert(pending.end(), cone_.begin(), cone_.end());
   }
   order_by_birth();

@@ -9,8 +9,8 @@
 
 namespace overlapper {
 
-/// Orthogonal unit vectors: along the longest way between two of the points, but for a factor, then along the longest
-/// way from there. The point of an element is `at(element)`.
+/// Orthogonal unit vectors. The first is along the longest line between two of the points, up to a factor. The second
+/// is along the largest distance from this line. The point of an element is `at(element)`.
 template <class Elements, class At>
 std::array<Vec3, 3> fitted_axes(const Elements& elements, At at) {
   const auto farthest = [&](auto distance) {
@@ -23,13 +23,12 @@ std::array<Vec3, 3> fitted_axes(const Elements& elements, At at) {
   const Vec3 first = unit(along);
   const auto across = [&](Vec3 v) { return v - dot(v, first) * first; };
   const Vec3 aside = across(farthest([&](Vec3 p) { return norm2(across(p - end)); }) - end);
-  // Once more, as rounding leaves a short rest far from orthogonal.
+  // Repeated, because rounding leaves a short rest far from orthogonal.
   const Vec3 second = norm2(aside) > 0 ? unit(across(unit(aside))) : any_orthogonal(first);
   return {first, second, cross(first, second)};
 }
 
-/// Orthogonal unit vectors, by Jacobi's rotations: those along which the places of the points do not depend on each
-/// other.
+/// Orthogonal unit vectors by Jacobi's rotations. Along these axes, the coordinates of the points are uncorrelated.
 template <class Elements, class At>
 std::array<Vec3, 3> principal_axes(const Elements& elements, At at) {
   Vec3 mean;
@@ -40,7 +39,7 @@ std::array<Vec3, 3> principal_axes(const Elements& elements, At at) {
     spread.row0 += d.x * d, spread.row1 += d.y * d, spread.row2 += d.z * d;
   }
   std::array<Vec3, 3> axes{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
-  constexpr int kSweeps = 6;  // the error is squared in each
+  constexpr int kSweeps = 6;  // the error is squared in each sweep
   for (int sweep = 0; sweep < kSweeps; ++sweep)
     for (const auto& [p, q] : {std::pair{0, 1}, {0, 2}, {1, 2}}) {
       const Vec3 to_p = spread * axes[p], to_q = spread * axes[q];

@@ -3,12 +3,12 @@
 #include <cmath>
 #include <cstdint>
 
-/// Rows of doubles that are worked on at once, and what compilers have to do so. Nothing else in the core is written
+/// Rows of doubles for simultaneous operations, and the compiler features for them. Nothing else in the core is written
 /// for one compiler.
 ///
-/// GCC and clang have vectors of their own, and compile a function for machines that have more than the rest is
-/// compiled for; but not for Windows, where GCC leaves the stack less aligned than wide vectors want it. Elsewhere rows
-/// are arrays, and loops over them are left to the compiler. The bits are the same.
+/// GCC and clang have vector types. They can compile a function for machines with more instructions than the rest of
+/// the code needs. On Windows, GCC aligns the stack less than wide vectors need, so vectors are not used there.
+/// Elsewhere rows are arrays, and the compiler handles loops over them. The bits are the same.
 #if defined(__GNUC__) && !defined(_WIN32) && !defined(OVERLAPPER_PLAIN_LANES)
 #define OVERLAPPER_VECTORS
 #ifdef __x86_64__
@@ -24,14 +24,14 @@ namespace overlapper {
 
 #ifdef OVERLAPPER_VECTORS
 
-/// Two doubles, which every machine adds, multiplies and compares at once.
+/// Two doubles; every machine adds, multiplies and compares both at once.
 using TwoLanes = double __attribute__((vector_size(16)));
 
-/// Four doubles, by whatever the machine has. Aligned as the widest of machines want it: functions compiled for those
-/// meet data of others.
+/// Four doubles, in the form that the machine has. The alignment is that of the widest machines, because functions
+/// compiled for these share data with others.
 using Quad = double __attribute__((vector_size(32), aligned(32)));
 
-/// In each lane one or the other. A quad is not returned, as machines differ in how they do it.
+/// Selects one or the other in each lane. A quad is not returned, because machines return it in different ways.
 template <class Which, class Lanes>
 inline void choose(const Which& which, const Lanes& one, const Lanes& other, Lanes& result) {
   result = which ? one : other;
@@ -47,7 +47,7 @@ struct LanesOf {
   constexpr const T& operator[](int i) const { return lane[i]; }
 };
 
-/// Operations go lane by lane, or take the same number for every lane. As in a vector, true is all bits set.
+/// Operations work lane by lane, or with one number for all lanes. As in a vector, true is all bits set.
 template <class T, int count, class Operation>
 constexpr auto each_of(const LanesOf<T, count>& a, const LanesOf<T, count>& b, Operation operation) {
   LanesOf<decltype(operation(T{}, T{})), count> row{};
@@ -118,8 +118,8 @@ constexpr void choose(const LanesOf<std::int64_t, count>& which, const LanesOf<d
 
 #endif
 
-// A function that is OVERLAPPER_WIDER is compiled, with all that it calls, for AVX2 and FMA, and called if is_wider().
-// Where the macro is not defined, all functions are compiled for one and the same machine.
+// A function marked OVERLAPPER_WIDER is compiled, with all functions that it calls, for AVX2 and FMA. It is called if
+// is_wider(). If the macro is not defined, all functions are compiled for the same machine.
 #if defined(OVERLAPPER_VECTORS) && defined(__x86_64__)
 #define OVERLAPPER_FUSING __attribute__((target("avx2,fma")))
 #if !(defined(__AVX2__) && defined(__FMA__))

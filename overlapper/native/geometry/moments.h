@@ -6,8 +6,7 @@
 
 namespace overlapper {
 
-/// Integrals over a solid of 1, of coordinates, and of their squares and products, about a point that the caller
-/// knows.
+/// Integrals over a solid of 1, of coordinates, and of their squares and products, about a point that the caller knows.
 struct Moments {
   double volume = 0;       ///< m³
   Vec3 first;              ///< ∫ x dV
@@ -18,7 +17,7 @@ struct Moments {
     return *this;
   }
 
-  /// About a point from which theirs is at `offset`.
+  /// The same moments about another point; `offset` leads from the other point to the present one.
   Moments seen_from(Vec3 offset) const {
     const Vec3 f = first, o = offset, g = 2.0 * f + volume * o;
     return {volume, f + volume * o, squares + scaled(o, g),
@@ -26,7 +25,7 @@ struct Moments {
                             f.x * o.y + f.y * o.x + volume * o.x * o.y}};
   }
 
-  /// These moments, of coordinates along three axes, in the coordinates that the axes are given in.
+  /// Maps moments of coordinates along three axes to the coordinates in which the axes are given.
   Moments along(const std::array<Vec3, 3>& axes) const {
     const double second[3][3] = {
         {squares.x, products.z, products.y}, {products.z, squares.y, products.x}, {products.y, products.x, squares.z}};
@@ -49,7 +48,7 @@ struct Moments {
     return {{s.y + s.z, -p.z, -p.y}, {-p.z, s.z + s.x, -p.x}, {-p.y, -p.x, s.x + s.y}};
   }
 
-  /// The square of the distance from the point over the width: the factor by which second moments lose digits.
+  /// The squared distance of the centroid over the squared width: the factor by which second moments lose digits.
   double remoteness() const {
     const Vec3 c = first / volume, q = squares / volume;
     return norm2(c) / (q.x + q.y + q.z - norm2(c));

@@ -5,9 +5,8 @@
 
 namespace overlapper {
 
-/// A value that is computed when first asked for, and kept. Threads that ask at the same time compute it each for
-/// itself, and the first to be done hands its value to all: there is no lock that a process forked meanwhile would
-/// inherit closed.
+/// A value that is computed on first use, and kept. Threads that ask at the same time each compute it, and all get the
+/// value of the thread that finishes first. There is no lock, which a forked process could inherit closed.
 template <class T>
 class Once {
  public:

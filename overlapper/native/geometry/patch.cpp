@@ -11,7 +11,7 @@ namespace {
 
 double length(double u, double v) { return std::sqrt(u * u + v * v); }
 
-/// An angle within a quarter, and what it counts for.
+/// An angle within a quarter, and its weight.
 struct Angle {
   double cosine, sine, weight;
 };
@@ -40,7 +40,7 @@ static_assert(
 /// The mean distance from (p, q) of the points of an ellipse about the origin, with half axes a and b along the
 /// coordinates. It is a third of the integral of |y| y × dy along the border, seen from (p, q), per area.
 double mean_distance(double a, double b, double p, double q) {
-  // The width of an ellipse as narrow as this does not matter, but the width divides.
+  // The width of such a narrow ellipse does not matter, but it is a divisor.
   const double least = 1e-6 * (a + b + std::abs(p) + std::abs(q)) + DBL_MIN;
   a = std::max(a, least), b = std::max(b, least);
   const double along = p / a, across = q / b;
@@ -56,7 +56,7 @@ double mean_distance(double a, double b, double p, double q) {
 double distance_in_ellipse(double u, double v, double uu, double uv, double vv) {
   const double middle = (uu + vv) / 2, half = (uu - vv) / 2, off = length(half, uv);
   const double turn = std::atan2(uv, half) / 2, cosine = std::cos(turn), sine = std::sin(turn);
-  // Parts that are seen from behind count as negative, and may leave negative moments.
+  // Parts seen from behind have negative area, and may make moments negative.
   const double a = 2 * std::sqrt(std::max(0.0, middle + off)), b = 2 * std::sqrt(std::max(0.0, middle - off));
   return mean_distance(a, b, -cosine * u - sine * v, sine * u - cosine * v);
 }
@@ -71,7 +71,7 @@ double distance_over_edge(double a, double b, double c, double d) {
   if (!(std::abs(twice) > 0x1p-100 * (p * q))) return 0;
   const double along = length(c - a, d - b), h = twice / along, square = h * h;
   const double from = (a * (c - a) + b * (d - b)) / along, to = (c * (c - a) + d * (d - b)) / along;
-  // The difference of both ends' angles, by sums of numbers of one sign.
+  // The difference of the angles at both ends, by sums of numbers of one sign.
   const double angle = from >= 0 ? std::log((to + q) / (from + p))
                        : to <= 0 ? std::log((p - from) / (q - to))
                                  : std::log((to + q) * ((p - from) / square));
@@ -81,14 +81,14 @@ double distance_over_edge(double a, double b, double c, double d) {
 Patch PatchSums::patch() const {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   Patch result{area_, {kNone, kNone, kNone}, {{}, {}, {}}, kNone};
-  // An area that is only rounding differs each time that it is summed.
+  // An area that is only rounding differs each time it is summed.
   if (!(size_ > 0 && one_ > size_ / 2 && one_ < 2 * size_)) return result;
   const double u = u1_ / one_, v = v1_ / one_;
   result.centre = origin_ + (u * u_ + v * v_);
   const double uu = uu_ - u * u1_, uv = uv_ - u * v1_, vv = vv_ - v * v1_;
   const Vec3 along_u = uu * u_ + uv * v_, along_v = uv * u_ + vv * v_;
   result.moments = {u_.x * along_u + v_.x * along_v, u_.y * along_u + v_.y * along_v, u_.z * along_u + v_.z * along_v};
-  // Distances of parts that are seen from behind count as negative, too.
+  // Distances of parts seen from behind are negative, too.
   result.distance =
       edges_alone_ ? std::max(0.0, distance_ / one_) : distance_in_ellipse(u, v, uu / one_, uv / one_, vv / one_);
   return result;

@@ -4,27 +4,27 @@
 
 namespace overlapper {
 
-/// The area within the line where the surfaces of two bodies cross, seen along the area vector of that line. Integrals
-/// of functions that do not change along this direction are the same over every surface within the line (Gauss).
+/// The area within the line where the surfaces of two bodies cross, seen along the area vector of that line. If a
+/// function does not change along this direction, its integral is the same over every surface within the line (Gauss).
 struct Patch {
-  Vec3 area;    ///< m²: the area vector of the second body's part of the surface, so that it points to the first
-  Vec3 centre;  ///< of that area, in the plane through the centroid of the volume; not a number without an area
+  Vec3 area;    ///< m²: the area vector of the second body's part of the surface; it points to the first body
+  Vec3 centre;  ///< of that area, in the plane through the centroid of the volume; NaN without an area
   Mat3 moments{{}, {}, {}};  ///< m⁴: ∫ x xᵀ dA about the centre
-  double distance = 0;       ///< m: the mean of its points from the centroid; not a number without an area
+  double distance = 0;       ///< m: the mean distance of its points from the centroid; NaN without an area
 };
 
-/// The same in other coordinates.
+/// The same patch in other coordinates.
 inline Patch turned(const Patch& patch, const Mat3& rotation, Vec3 translation) {
   return {rotation * patch.area, rotation * patch.centre + translation, rotation * patch.moments * transposed(rotation),
           patch.distance};
 }
 
-/// ∫ |x| dA over the triangle from the origin to the edge from (a, b) to (c, d), negative where that goes clockwise.
+/// ∫ |x| dA over the triangle from the origin to the edge from (a, b) to (c, d). Negative if the edge goes clockwise.
 double distance_over_edge(double a, double b, double c, double d);
 
 /// The plane that a patch is seen in, with integrals over the patch of 1, u, v, u², uv and v². The coordinates u and v
-/// are right-handed, about the centroid. The mean distance is exact if edges alone bound the patch. Otherwise the patch
-/// counts as an ellipse, as the parts of both surfaces have the same ellipse, but not the same mean distance.
+/// are right-handed, about the centroid. The mean distance is exact if only edges bound the patch. Otherwise the patch
+/// counts as an ellipse. The parts of both surfaces have the same ellipse, but not the same mean distance.
 class PatchSums {
  public:
   PatchSums(Vec3 centroid, Vec3 area) : origin_(centroid), area_(area), size_(norm(area)) {
@@ -38,13 +38,13 @@ class PatchSums {
   Vec3 u() const { return u_; }
   Vec3 v() const { return v_; }
 
-  /// Integrals over a part, or over all that is on the left of a line.
+  /// Adds integrals over a part, or over everything on the left of a line.
   void add(double one, double u, double v, double uu, double uv, double vv) {
     sum(one, u, v, uu, uv, vv);
     edges_alone_ = false;
   }
 
-  /// Along an edge of the border, counter-clockwise seen against the normal (Green).
+  /// Adds an edge of the border, counter-clockwise seen against the normal (Green).
   void add_edge(Vec3 from, Vec3 to) {
     const double a = dot(from - origin_, u_), b = dot(from - origin_, v_);
     const double c = dot(to - origin_, u_), d = dot(to - origin_, v_), twice = a * d - b * c;
@@ -76,7 +76,7 @@ class PatchSums {
   Vec3 origin_, area_, normal_, u_, v_;
   double size_;
   double one_ = 0, u1_ = 0, v1_ = 0, uu_ = 0, uv_ = 0, vv_ = 0;
-  double distance_ = 0;  ///< of what edges border
+  double distance_ = 0;  ///< of the part within edges
   bool edges_alone_ = true;
 };
 

@@ -8,10 +8,10 @@
 
 namespace overlapper {
 
-/// A bounded polytope about the origin, as dual of a hull of dual points. Facet f is the polygon
-/// ring[ring_start[f] .. ring_start[f + 1]) of vertices, counter-clockwise from outside, in the plane dot(dual[f], x) =
-/// 1, which is number plane[f] of the planes that were dualised. Every vertex lies on exactly three facets: where more
-/// than three planes meet, vertices coincide and some ridges have no length.
+/// A bounded polytope about the origin, as the dual of a hull of dual points. Facet f is the polygon ring[ring_start[f]
+/// .. ring_start[f + 1]) of vertices, counter-clockwise from outside, in the plane dot(dual[f], x) = 1. This is number
+/// plane[f] of the planes that were dualised. Every vertex lies on exactly three facets. If more than three planes
+/// meet, vertices coincide and some ridges have no length.
 struct Polytope {
   std::vector<Vec3> vertices;
   std::vector<Vec3> dual;
@@ -30,8 +30,8 @@ double farthest_vertex(const Polytope& polytope);
 /// The dual point normal / (offset - dot(normal, origin)) of a plane that has `origin` strictly inside.
 inline Vec3 polar_dual(const Plane& plane, Vec3 origin) { return plane.normal / -signed_distance(plane, origin); }
 
-/// The polytope whose dual the hull is: the hull's facets become vertices, its vertices facets. The origin must be
-/// strictly inside.
+/// The polytope whose dual the hull is. The hull's facets become vertices, and its vertices become facets. The origin
+/// must be strictly inside.
 Polytope polar_dual(const ExpandingHull& hull);
 
 /// Integrals over a polytope that has the origin inside.

@@ -6,7 +6,8 @@
 namespace overlapper {
 namespace {
 
-/// A sum of doubles that do not overlap, smallest first (Shewchuk 1997, section 2); its sign is that of the last one.
+/// A sum of doubles that do not overlap, smallest first (Shewchuk 1997, section 2). Its sign is that of the last
+/// double.
 template <int Capacity>
 struct Expansion {
   std::array<double, Capacity> term;
@@ -25,8 +26,8 @@ struct Expansion {
   int sign() const { return count == 0 ? 0 : (term[count - 1] > 0) - (term[count - 1] < 0); }
 };
 
-/// Adds sign * u * v * w, each factor an exact pair, without rounding: eight products of three doubles, four terms
-/// each.
+/// Adds sign * u * v * w without rounding. Each factor is an exact pair. There are eight products of three doubles,
+/// with four terms each.
 template <int Capacity>
 void add_product(Expansion<Capacity>& sum, double sign, DoubleDouble u, DoubleDouble v, DoubleDouble w) {
   for (double p : {u.head, u.tail}) {

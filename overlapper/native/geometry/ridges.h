@@ -8,7 +8,7 @@
 
 namespace overlapper {
 
-/// The directed ridges of a polytope by their ends: the number of each is its place in the polytope's `ring`.
+/// The directed ridges of a polytope by their ends. The number of a ridge is its place in the polytope's `ring`.
 class Ridges {
  public:
   explicit Ridges(const Polytope& polytope)
@@ -20,7 +20,7 @@ class Ridges {
     for (size_t v = 1; v < starts_.size(); ++v) starts_[v] += starts_[v - 1];
     for (int place = 0; place < static_cast<int>(ring.size()); ++place)
       heads_[starts_[ring[place]]++] = {ring[next(place)], place};
-    // Each start has moved on to the next one's.
+    // Each start has moved on to the next start.
     for (size_t v = starts_.size() - 1; v > 0; --v) starts_[v] = starts_[v - 1];
     starts_[0] = 0;
     for (size_t v = 0; v + 1 < starts_.size(); ++v) {

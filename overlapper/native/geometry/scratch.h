@@ -6,8 +6,8 @@
 
 namespace overlapper {
 
-/// Memory that a thread uses again and again. A signal handler that computes something itself at a cancellation point
-/// may ask for memory that is in use, and gets other memory. Contents that an exception left half done are dropped.
+/// Memory that a thread uses again and again. At a cancellation point, a signal handler may compute something and ask
+/// for memory that is in use. It gets other memory. After an exception, half-done contents are dropped.
 template <class T>
 class Scratch {
  public:

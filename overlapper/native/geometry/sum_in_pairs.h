@@ -5,8 +5,8 @@
 
 namespace overlapper {
 
-/// A sum of sums of two, of four, of eight and so on, as in Higham (1993): each of n terms is rounded log2(n) times,
-/// and not n times.
+/// A sum of sums of two, of four, of eight and so on (Higham 1993). Each of n terms is rounded log2(n) times instead of
+/// n times.
 template <class Term>
 class SumInPairs {
  public:

@@ -5,7 +5,7 @@
 namespace overlapper {
 
 /// The sum head + tail, where tail is at most half an ulp of head. One addition or product of doubles is exact (Knuth;
-/// Dekker). Further operations are right to about 2^-100 of the larger operand.
+/// Dekker). Further operations have an error of about 2^-100 of the larger operand.
 struct DoubleDouble {
   double head = 0, tail = 0;
   friend bool operator==(const DoubleDouble&, const DoubleDouble&) = default;
@@ -70,8 +70,8 @@ inline WideVector cross(const WideVector& u, const WideVector& v) {
   return {u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
 }
 
-/// cross(b - a, c - a), from the two shorter edges: on a needle the longer two are nearly parallel, and most of their
-/// product cancels.
+/// cross(b - a, c - a), from the two shorter edges. On a needle the two longer edges are nearly parallel, and most of
+/// their product cancels.
 inline WideVector wide_normal(Vec3 a, Vec3 b, Vec3 c) {
   const double ab = norm2(b - a), bc = norm2(c - b), ca = norm2(a - c);
   if (ab >= bc && ab >= ca) return cross(wide_difference(a, c), wide_difference(b, c));
@@ -89,10 +89,10 @@ inline WideVector operator*(double s, const WideVector& v) { return DoubleDouble
 inline WideVector operator/(const WideVector& v, DoubleDouble s) { return {v.x / s, v.y / s, v.z / s}; }
 inline double rounded(DoubleDouble a) { return a.head; }
 inline Vec3 rounded(const WideVector& v) { return {v.x.head, v.y.head, v.z.head}; }
-/// The vector less its `rounded`, rounded.
+/// The vector minus its `rounded`, rounded.
 inline Vec3 tail(const WideVector& v) { return {v.x.tail, v.y.tail, v.z.tail}; }
 
-// Plain doubles are their own, so that code can be written for both.
+// Plain doubles stay as they are, so that one code serves both.
 inline double rounded(double a) { return a; }
 inline Vec3 rounded(Vec3 v) { return v; }
 
@@ -103,7 +103,7 @@ inline WideVector apply_transposed(const Mat3& m, const WideVector& v) {
   return v.x * wide(m.row0) + v.y * wide(m.row1) + v.z * wide(m.row2);
 }
 
-/// The length of a vector; scaled by a power of two first, which keeps the squares in range.
+/// The length of a vector. Scaling by a power of two first keeps the squares in range.
 inline DoubleDouble norm(const WideVector& v) {
   const double largest = max_component(abs(rounded(v)));
   if (!(largest > 0)) return {};

@@ -5,8 +5,8 @@
 
 namespace overlapper {
 
-/// Four numbers in double-double. Copied quad by quad: left to itself, the compiler copies smaller pieces, and the quad
-/// that is loaded next waits for all of them.
+/// Four numbers in double-double. Copied quad by quad: the compiler alone would copy smaller pieces, and the next load
+/// of a quad would wait for all of them.
 struct WideLanes {
   constexpr WideLanes() : head{}, tail{} {}
   constexpr WideLanes(const Quad& heads, const Quad& tails) : head(heads), tail(tails) {}
@@ -41,8 +41,8 @@ OVERLAPPER_FUSING inline WideLanes fused_product(const Quad& a, const Quad& b) {
   return product;
 }
 
-/// The exact product, by fused multiply-adds or Dekker's way for machines that have none; the same bits, unless
-/// something underflows.
+/// The exact product, by fused multiply-adds, or by Dekker's way on machines without them. The bits are the same,
+/// unless something underflows.
 template <bool fused, class T>
 WideLanes two_product(const Quad& a, const T& b) {
   if constexpr (fused) {
@@ -80,10 +80,10 @@ inline WideLanes in_lanes(const WideVector& v, DoubleDouble last = {}) {
   return {Quad{v.x.head, v.y.head, v.z.head, last.head}, Quad{v.x.tail, v.y.tail, v.z.tail, last.tail}};
 }
 
-/// Four vectors side by side, a coordinate of each in a lane, or the columns of a matrix.
+/// Four vectors side by side, with a coordinate of each in a lane; or the columns of a matrix.
 using WideColumns = std::array<WideLanes, 4>;
 
-/// The transpose of a 4 × 4 matrix, in two steps that are an instruction or two each.
+/// The transpose of a 4 × 4 matrix, in two steps of one or two instructions each.
 inline void transpose(Quad& a, Quad& b, Quad& c, Quad& d) {
   const Quad ab02{a[0], b[0], a[2], b[2]}, ab13{a[1], b[1], a[3], b[3]};
   const Quad cd02{c[0], d[0], c[2], d[2]}, cd13{c[1], d[1], c[3], d[3]};
@@ -102,7 +102,7 @@ inline WideColumns transposed(const WideLanes& a, const WideLanes& b, const Wide
 inline const Quad& rounded(const Quad& a) { return a; }
 inline const Quad& rounded(const WideLanes& a) { return a.head; }
 
-/// A sum of products right to a few 2^-104 of the largest of them (Ogita, Rump and Oishi 2005, Dot2).
+/// A sum of products with an error of a few 2^-104 of the largest product (Ogita, Rump and Oishi 2005, Dot2).
 template <bool fused>
 struct WideSum {
   Quad head, tail;

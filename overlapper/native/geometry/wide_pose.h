@@ -18,7 +18,7 @@ inline WideVector apply_transposed(const WideMatrix& m, const WideVector& v) {
   return scaled(m.row0, v.x) + scaled(m.row1, v.y) + scaled(m.row2, v.z);
 }
 
-/// The rotation that a quaternion of any length stands for: every entry to 2^-98 or better.
+/// The rotation of a quaternion of any length. The error of every entry is at most 2^-98.
 inline WideMatrix wide_rotation(Quaternion given) {
   const Quaternion q = in_range(given);
   const DoubleDouble xx = two_product(q.x, q.x), yy = two_product(q.y, q.y), zz = two_product(q.z, q.z),
@@ -33,7 +33,8 @@ inline WideMatrix wide_rotation(Quaternion given) {
           {twice(xz - yw), twice(yz + xw), part(ww - xx - yy + zz)}};
 }
 
-/// The same in doubles, every entry right to half an ulp of itself: so it is a rotation but for those.
+/// The same in doubles. The error of every entry is half an ulp of the entry, so the matrix is a rotation up to these
+/// errors.
 inline Mat3 rotation_matrix(Quaternion q) {
   if (unturned(q)) return {};
   const WideMatrix exactly = wide_rotation(q);

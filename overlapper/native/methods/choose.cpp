@@ -178,11 +178,12 @@ Settled settled_in_wide_arithmetic(const Arrangement& at, double reach, std::vec
   return settled;
 }
 
-/// Up to so many half-spaces, any four of all are tried; of more, any four that the search has looked at.
+/// Up to so many half-spaces, any four of all are tried. With more, any four of those that the search has looked at are
+/// tried.
 constexpr size_t kMostTried = 16;
 
 /// Settles the status of half-spaces alone exactly. The search looks only near their planes, and rounding tilts these.
-/// Throws std::invalid_argument if half-spaces have a common set that is unbounded, or where the search did not look.
+/// Throws std::invalid_argument if the common set is unbounded, or is far from the places where the search looked.
 void settle_half_spaces(std::span<const Placed> bodies, std::span<const OwnedPlane> cuts, Search& search) {
   if (search.status != Status::kOverlapping) {
     std::vector<bool> tried(bodies.size(), bodies.size() <= kMostTried);
@@ -211,7 +212,7 @@ bool cores_reach(const Placed& a, const Placed& b, const Distance& d, double rea
 /// True if the bodies certainly overlap because an ellipsoid holds a point of the flat body, with interior points of
 /// that body nearby. The witness points of bodies without a gap are points of both, but for rounding.
 bool ellipsoid_reaches(const Placed& a, const Placed& b, const Distance& d, double reach) {
-  constexpr double kInside = 1e-9;  // relative to the half axes; what is shallower has other proofs
+  constexpr double kInside = 1e-9;  // relative to the half axes; shallower contacts have other proofs
   const bool first = stretched(a.shape) != nullptr;
   const Placed &ellipsoid = first ? a : b, &flat = first ? b : a;
   const Ellipsoid* own = stretched(ellipsoid.shape);

@@ -10,10 +10,10 @@
 namespace overlapper {
 namespace {
 
-/// The determinant of three unit normals in doubles is right to this, with a wide margin.
+/// Error of the determinant of three unit normals in doubles, with a wide margin.
 constexpr double kClearOfRounding = 1e-14;
 
-/// { x : dot(normal, x) <= offset }, the normal of some length. `direction` is the unit normal in doubles.
+/// { x : dot(normal, x) <= offset }, with a normal of any length. `direction` is the unit normal in doubles.
 struct ExactPlane {
   ExactVector normal;
   Exact offset;
@@ -30,7 +30,7 @@ std::array<ExactVector, 3> exact_rotation(Quaternion q) {
 }
 
 ExactPlane exact_plane(const Placed& body) {
-  // As given: the doubles are the heads.
+  // The numbers as given are the heads.
   const WidePlane facet = *wide_facet(body.shape, 0);
   const Vec3 given = rounded(facet.normal);
   const int down = -std::ilogb(max_component(abs(given)));
@@ -62,8 +62,8 @@ int orientation(const ExactPlane& a, const ExactPlane& b, const ExactPlane& c) {
   return dot(cross(a.normal, b.normal), c.normal).sign();
 }
 
-/// Whether the sum of the normals with these weights, all of one sign, is zero by construction, and the sum of the
-/// offsets is negative: no point keeps all inequalities (Farkas).
+/// Whether all weights have one sign, and the sum of the offsets by the sizes of these weights is negative. The
+/// weighted sum of the normals is zero by construction. No point then satisfies all inequalities (Farkas).
 template <size_t kCount>
 bool contradict(const std::array<const ExactPlane*, kCount>& planes, const std::array<Exact, kCount>& weight) {
   const int sign = weight[0].sign();
@@ -105,7 +105,7 @@ bool contradict(const ExactPlane& a, const ExactPlane& b, const ExactPlane& c, c
 
 }  // namespace
 
-/// By Helly's theorem, four of the half-spaces have no common point then.
+/// By Helly's theorem, at most four of the half-spaces then have no common point.
 bool have_no_common_point(std::span<const Placed> half_spaces) {
   const std::vector<ExactPlane> planes = exact_planes(half_spaces);
   for (size_t i = 0; i < planes.size(); ++i)

@@ -7,11 +7,11 @@
 namespace overlapper {
 
 /// Whether half-spaces have no common point. Exact, from normals, offsets, positions and orientations as given: planes
-/// that are opposite but for any tilt meet somewhere. Bodies are about any reference.
+/// that are not exactly opposite meet somewhere. Bodies are about any reference.
 bool have_no_common_point(std::span<const Placed> half_spaces);
 
-/// Whether half-spaces bound a set: the origin is strictly inside the hull of their normals as given. A set that a tilt
-/// by the rounding of a unit normal would open may count as open.
+/// Whether half-spaces bound a set: the origin is strictly inside the hull of their normals as given. If a tilt by the
+/// rounding of a unit normal would open the set, it may count as open.
 bool bound_a_set(std::span<const Placed> half_spaces);
 
 }  // namespace overlapper

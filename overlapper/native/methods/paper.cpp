@@ -30,7 +30,7 @@ struct Part {
   std::vector<int> owner;
 };
 
-/// A polytope, or nothing, or a flat set.
+/// A polytope, an empty set, or a flat set.
 struct Intersection {
   Status status = Status::kSeparated;
   Part part;
@@ -94,7 +94,7 @@ bool shift_inside(const Part& a, const Part& b, double on_boundary, Vec3& point)
   return false;
 }
 
-/// The planes through the vertex dual to a face of the first hull: the face's own three planes. If more planes meet in
+/// The planes through the vertex dual to a face of the first hull: the three planes of the face. If more planes meet in
 /// that point, also the planes of neighbouring faces with the same dual.
 std::vector<int> planes_through(const ExpandingHull& dual, int face, std::span<const Vec3> vertex_of_face,
                                 double same) {
@@ -134,8 +134,8 @@ int plane_of_facet(const HullData& hull, int facet, std::span<const std::vector<
   return best;
 }
 
-/// Steps 3 to 5: the dual points of all planes about `origin`, their hull, the dual of its faces, and the hull of that
-/// dual.
+/// Steps 3 to 5: the dual points of all planes about `origin`, their hull, the dual points of its faces, and the hull
+/// of these.
 Intersection intersect_about(const Part& a, const Part& b, Vec3 origin) {
   ExpandingHull dual;
   std::vector<Plane> planes;
@@ -250,8 +250,8 @@ Region region_of(const Part& part) {
   return region;
 }
 
-/// The status of bodies one of which is thinner than the rounding of its corners. The article has no polytope for that
-/// body, so a gap between two bodies is all that can be told.
+/// The status of bodies if one of them is thinner than the rounding of its corners. The article has no polytope for
+/// that body. Only a gap between two bodies can then be proved.
 Status status_without_polytopes(std::span<const Placed> bodies) {
   for (const Placed& a : bodies)
     for (const Placed& b : bodies) {

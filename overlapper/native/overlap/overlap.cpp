@@ -101,7 +101,7 @@ const Region& Overlap::finest_region() const {
 }
 
 const Region& Overlap::drawn() const {
-  // Only the finest polytope has each triangle of a hull by itself. The others have facets.
+  // Only the finest polytope has each triangle of a hull separately. The others have facets.
   constexpr double kRough = 1e-10;
   const auto rough = [](const Region::Facet& facet) { return !(facet.rounding <= kRough * facet.slack); };
   const bool of_paper = method_ == Method::kPaper;

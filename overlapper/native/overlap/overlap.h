@@ -27,7 +27,7 @@ class Overlap {
   /// shapes, as a fraction of the volume. Polyhedra are exact and ignore it.
   Overlap(std::vector<Placed> bodies, double tolerance, Method method);
   Overlap(const Placed& a, const Placed& b, double tolerance, Method method);
-  Overlap(const Overlap& other);  ///< the two share what either computes from then on
+  Overlap(const Overlap& other);  ///< both share all later results
   Overlap(Overlap&& other) noexcept;
 
   std::span<const Placed> bodies() const { return bodies_.empty() ? std::span<const Placed>(two_) : bodies_; }
@@ -35,7 +35,7 @@ class Overlap {
   Method method() const { return method_; }
   Status status() const { return status_; }
   bool pair() const { return bodies_.empty(); }
-  bool measured_at_once() const { return at_once_ && at_once_->measured; }  ///< cheap to repeat
+  bool measured_at_once() const { return at_once_ && at_once_->measured; }  ///< fast to repeat
 
   /// The way that gave the measures, or the status of bodies that do not overlap.
   Way way() const;

@@ -144,7 +144,7 @@ inline std::vector<std::int64_t> to_indices(nb::handle value, const std::string&
   try {
     const nb::module_ numpy = nb::module_::import_("numpy");
     array = numpy.attr("asarray")(value);
-    // numpy gives an empty list a float type.
+    // numpy gives an empty list a floating-point type.
     if (nb::cast<size_t>(array.attr("size")) == 0) array = array.attr("astype")("int64");
     array = array.attr("astype")("int64", "order"_a = "C", "casting"_a = "same_kind");
   } catch (nb::python_error& error) {

@@ -2,7 +2,7 @@
 
 #include "python/arrays.h"
 
-/// Frames as pybullet returns them.
+/// Frames in the form in which pybullet returns them.
 namespace overlapper::python {
 
 /// The items of a list or a tuple.

@@ -44,8 +44,8 @@ constexpr std::array<std::array<int, 4>, 6> box_rings() {
 }
 constexpr auto kBoxRings = box_rings();
 
-/// One coordinate of all corners and normals of a box, from one row of its rotation. The order is that of their
-/// numbers. The bits are the same as if each were placed alone.
+/// One coordinate of all corners and normals of a box, from one row of its rotation, in the order of their numbers. The
+/// bits are the same as if each corner and normal were placed alone.
 void place_box_coordinate(Vec3 row, Vec3 half, double origin, double* corners, double* normals) {
   constexpr TwoLanes sign{-1, 1};
   const TwoLanes x = sign * (row.x * half.x);
@@ -77,7 +77,7 @@ void set_box(Solid& solid, const Box& box) {
   for (int f = 0; f < 6; ++f) solid.set_plane(f, box.facet(f).normal, box.facet(f).offset);
 }
 
-/// In the order of hulls of cubes in recorded answers.
+/// The order is that of hulls of cubes in recorded answers.
 std::vector<Vec3> corners_along_axes(Vec3 h) {
   std::vector<Vec3> corners;
   for (double x : {-1.0, 1.0})

@@ -7,7 +7,7 @@ namespace overlapper {
 
 struct Hull;
 
-/// Around local z; `length` is the distance between the centres of the caps.
+/// Around the local z axis; `length` is the distance between the centres of the caps.
 struct Capsule : Bounded,
                  Smooth,
                  CentredAtOrigin,

@@ -56,8 +56,8 @@ template <class S, class T>
 Field(const char*, T S::*, const char*) -> Field<S, T>;
 
 // ----------------------------------------------------------------------------------------------------------- choices
-// What several shapes are or do alike. A shape inherits what is true of it: nothing is taken for granted of a shape
-// that does not say so. ConvexShape, in convex_shape.h, lists the questions.
+// Properties and behaviour that several shapes share. A shape inherits each property that is true for it. Nothing is
+// assumed about a shape that does not declare it. ConvexShape, in convex_shape.h, lists the questions.
 
 struct Bounded {
   static constexpr bool kBounded = true;

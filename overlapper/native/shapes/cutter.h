@@ -6,8 +6,8 @@
 namespace overlapper {
 
 /// Takes pieces of a shape with disjoint interiors. A piece is the part of at most one ball or cylinder inside planes.
-/// All numbers are in the shape's own coordinates. A region around everything that is measured may be known: pieces and
-/// planes that do not matter there are left out.
+/// All numbers are in the shape's own coordinates. A region around all measured parts may be known. Pieces and planes
+/// that do not matter in this region are left out.
 class Cutter {
  public:
   virtual void begin() = 0;        ///< a piece

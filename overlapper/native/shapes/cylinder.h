@@ -7,7 +7,7 @@ namespace overlapper {
 
 struct Hull;
 
-/// Around local z.
+/// Around the local z axis.
 struct Cylinder : Bounded,
                   Smooth,
                   CentredAtOrigin,

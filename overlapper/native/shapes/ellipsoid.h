@@ -30,7 +30,7 @@ as closely as `tolerance` asks.)";
   /// Throws std::invalid_argument with one sentence that names the argument.
   static Ellipsoid make(Vec3 half_axes);
 
-  /// With equal axes it gives the answers of a sphere.
+  /// An ellipsoid with equal axes gives the answers of a sphere.
   bool ball() const { return half_axes.x == half_axes.y && half_axes.y == half_axes.z; }
 
   Vec3 support(Vec3 direction) const;

@@ -67,7 +67,7 @@ struct HalfSpace : Flat,
   void place(Solid& solid, const Pose* pose, double beyond) const;
   void give(Mesh&) const {}
 
-  /// The point of the plane that is nearest to the origin: no direction but that of the normal has a farthest point.
+  /// The point of the plane that is nearest to the origin. Only the direction of the normal has a farthest point.
   WideVector wide_core_support(const WideVector&) const;
   WidePlane wide_tightest(const WideVector&, const WideTriangles&) const;
   void append_wide_planes(const WideBody& body, std::vector<WidePlane>& planes) const;

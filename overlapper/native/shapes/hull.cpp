@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// If facets hold their corners only but for rounding, the planes of at most so many triangles are faces instead.
+/// If facets contain their corners only up to rounding, the planes of at most so many triangles are faces instead.
 constexpr size_t kMostTriangles = 256;
 
 /// The plane among `planes` with the largest `value(plane)`.

@@ -66,7 +66,7 @@ ValueError for fewer than four points, for points that are not finite and for po
   }
   void append_wide_planes(const WideBody& body, std::vector<WidePlane>& planes) const;
 
-  /// m: bound of how far corners are off the planes of their facets; 0 if exact numbers give every facet.
+  /// m: bound of the distance of corners from the planes of their facets; 0 if exact numbers give every facet.
   double unexact() const;
   /// The plane of a facet through three of its corners, exactly. Other corners may be off the plane by the flatness.
   WidePlane plane_through_corners(int f) const;

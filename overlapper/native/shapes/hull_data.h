@@ -32,7 +32,7 @@ struct HullData {
   std::vector<Edge> edges;                      ///< empty if merging facets has left a ridge with one side only
   std::vector<std::array<int, 3>> facets_meet;  ///< per vertex: three of its facets with well-spread normals
   double radius = 0;                            ///< of a ball about the coordinates' origin that holds all vertices
-  double flatness = 0;  ///< m: most that vertices of a facet lie inside its plane, or neighbouring ones outside
+  double flatness = 0;  ///< m: most that vertices of a facet lie inside its plane, or neighbouring vertices outside
 
   std::span<const int> facet(int f) const {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);

@@ -12,8 +12,8 @@ namespace overlapper {
 
 /// Appends n points of a circle about z.
 void append_circle(double radius, double z, int n, std::vector<Vec3>& points);
-/// The number of corners of an inscribed polygon that is that near to its disc. `shape` is the shape's name in the
-/// error.
+/// The number of corners of an inscribed polygon that approximates its disc within the tolerance. `shape` is the
+/// shape's name in the error.
 int corners_of_circle(double tolerance, const char* shape);
 /// Points of a capsule along z; of a ball if the half length is 0.
 std::vector<Vec3> points_of_capsule(double radius, double half_length, double tolerance);

@@ -83,7 +83,7 @@ Steiner steiner(const HullData& hull) {
     const double length = norm(b - a);
     sums.mean_width += length * angle / 2;
     sums.of_edges += length * angle / 2 * ((a + b) / 2);
-    // The sum of the outward directions across the ridge: the normals' sum times the tangent of half the angle.
+    // The sum of the outward directions across the ridge: the sum of the normals times the tangent of half the angle.
     sums.of_corners += length / 3 * sine / (1 + cosine) * (left + right);
   }
   // The solid angle of the normals at a corner is a full turn less the angles of its facets.
@@ -233,7 +233,7 @@ class RoundedCutter {
     cutter_.cylinder(DoubleDouble{0.5} * (wide(a) + wide(b)), along, radius_, rounded(norm(between)) / 2);
     cut_through(-along, a);
     cut_through(along, b);
-    // The left facet lies to the left of the edge seen from outside: beyond it, the other way.
+    // Seen from outside, the left facet is on the left of the edge, so the direction beyond it is the opposite one.
     if (!cutter_.empty()) cut_through(unit(cross(core_.plane_through_corners(edge.left).normal, along)), a);
     if (!cutter_.empty()) cut_through(unit(cross(along, core_.plane_through_corners(edge.right).normal)), a);
     cutter_.end();

@@ -61,7 +61,7 @@ inline bool smooth(const Shape& shape) {
   return ask(shape, [](const auto& s) { return s.kSmooth; });
 }
 
-/// The plane of a half-space; null for what is bounded.
+/// The plane of a half-space; null for a bounded shape.
 inline const Plane* only_plane(const Shape& shape) {
   return ask(shape, [](const auto& s) -> const Plane* {
     if constexpr (std::decay_t<decltype(s)>::kBounded) return nullptr;
@@ -77,8 +77,8 @@ inline bool has_rims(const Shape& shape) { return core_kind(shape) == CoreKind::
 /// True for cylinders and stretched ellipsoids. GJK and EPA only approach a curved core, and find the direction there
 /// to half of the digits.
 inline bool has_curved_core(const Shape& shape) { return core_kind(shape) != CoreKind::kPolytope; }
-/// A smooth shape is its core (a point, a segment, a polytope) grown by a radius; every other shape is its own core, of
-/// radius 0.
+/// A smooth shape is its core (a point, a segment, a polytope) grown by a radius. Every other shape is its own core,
+/// with radius 0.
 inline double core_radius(const Shape& shape) {
   return ask(shape, [](const auto& s) { return s.core_radius(); });
 }
@@ -99,14 +99,14 @@ inline const HullData* polytope_of(const Shape& shape) {
   return ask(shape, [](const auto& s) -> const HullData* { return s.polytope(); });
 }
 
-/// All facet planes of a polytope; for a smooth shape a few tangent planes that already bound it. About the shape's
+/// All facet planes of a polytope. For a smooth shape, a few tangent planes that already bound it. About the shape's
 /// origin.
 inline void append_planes(const Shape& shape, std::vector<Plane>& planes) {
   ask(shape, [&](const auto& s) { s.append_planes(planes); });
 }
 
-/// How far a shape reaches from its own origin; for a half-space, the distance of its plane. For balls, capsules,
-/// cylinders, rounded hulls and ellipsoids, the corner of the box around them.
+/// Distance of the farthest point of a shape from its own origin; for a half-space, the distance of its plane. For
+/// balls, capsules, cylinders, rounded hulls and ellipsoids, the distance of the corner of the box around them.
 inline double radius(const Shape& shape) {
   return ask(shape, [](const auto& s) { return s.bounding_radius(); });
 }
@@ -138,11 +138,12 @@ inline bool has_graph(const Shape& shape) {
   return ask_flat(shape, [](const auto& s) { return s.has_graph(); });
 }
 
-/// The hull of points of a bounded shape that lacks at most that fraction of its volume; without data if the shape is
-/// thinner than the rounding of the points. Throws std::invalid_argument for shapes that method "paper" does not take.
+/// A hull of points of a bounded shape. The hull lacks at most the fraction `tolerance` of the volume. It has no data
+/// if the shape is thinner than the rounding of the points. Throws std::invalid_argument for shapes that method "paper"
+/// does not take.
 Hull inscribed(const Shape& shape, double tolerance);
 
-/// Upper bound of how far a shape reaches from its own origin; for a half-space, of the distance of its plane.
+/// Upper bound of the distance of a shape's points from its own origin; for a half-space, of the distance of its plane.
 inline double reach(const Shape& shape) {
   return ask(shape, [](const auto& s) { return s.reach(); });
 }

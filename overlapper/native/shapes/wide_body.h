@@ -9,8 +9,8 @@ namespace overlapper {
 
 /// A placed shape in double-double, from its defining numbers: corners, sizes, position and orientation. The
 /// orientation is the exact rotation of its quaternion of any length. Coordinates are relative to `about`, which need
-/// not be a double. Near a small common set, planes and points rounded to doubles are then accurate relative to its
-/// size.
+/// not be a double. Near a small common set, planes and points rounded to doubles are then accurate relative to the
+/// size of that set.
 class WideBody {
  public:
   WideBody(const Placed& body, const WideVector& about);

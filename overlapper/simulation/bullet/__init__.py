@@ -1,1 +1,1 @@
-"""Bullet's own half: pybullet is asked here and nowhere else."""
+"""The part for Bullet. Only this package asks pybullet."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def numbers(text: str) -> list[float | str]:
-    """The numbers of an attribute; a word that is no number stays one."""
+    """The numbers of an attribute. A word that is not a number stays a string."""
     return [_number(word) for word in text.split()]
 
 

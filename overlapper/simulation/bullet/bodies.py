@@ -25,45 +25,47 @@ class Bodies(AnyBodies):
             for contact in bodies.overlaps():
                 ...
 
-    Boxes, spheres, capsules, cylinders, planes and convex meshes are modelled, compounds part by part. What cannot be
-    (soft bodies, flat hulls, height fields without a recorder) is in `skipped`, with one SkippedShapeWarning each. So
-    are meshes of a file that pybullet could not read, if a recorder has heard of the file: nothing else tells of them.
+    Boxes, spheres, capsules, cylinders, planes and convex meshes are modelled. Compounds are modelled part by part.
+    Soft bodies, flat hulls and height fields without a recorder are not modelled. They are in `skipped`, and each gives
+    one SkippedShapeWarning. The same holds for mesh files that pybullet could not read, but only if a recorder has
+    noted the model that names them.
 
-    Concave meshes are decomposed into convex parts, which count as so many shapes of their link and are listed in
-    `decomposed`. `concave_threshold`, from 0.01 to 1, is the concavity that may be left (see
-    overlapper.polytopes.decomposition). It takes up to minutes the first time, and needs the extra `concave`. A mesh
-    whose surface is open bounds no volume and is skipped; with concave="enclose" CoACD lays walls around it. With
-    concave="skip" all concave meshes are.
+    Concave meshes are decomposed into convex parts. Each part is a shape of the link, and `decomposed` lists the
+    meshes. `concave_threshold`, from 0.01 to 1, is the concavity that may be left (see
+    overlapper.polytopes.decomposition). The first decomposition of a mesh may take minutes and needs the extra
+    `concave`. A mesh with an open surface bounds no volume and is skipped. With concave="enclose" CoACD closes such
+    meshes by walls. With concave="skip" all concave meshes are skipped.
 
-    With surface="margin" convex meshes have the margin that Bullet lays around them, 1 mm by default, so that depths
-    are those of pybullet's contact distances. Boxes and cylinders are the same either way, as their margin lies inside.
-    Bullet rounds their edges by it in most pairs, which takes up to 0.73 mm off a corner. Convex parts of concave
-    meshes have none. A margin that changes is noticed by `update()` where `getDynamicsInfo` of the base tells.
+    With surface="margin" convex meshes have the margin that Bullet lays around them, 1 mm by default. Depths then agree
+    with pybullet's contact distances. Boxes and cylinders are the same either way, as their margin lies inside. In most
+    pairs Bullet rounds their edges by the margin, which takes up to 0.73 mm off a corner. Convex parts of concave
+    meshes have no margin. `update()` notices a changed margin if `getDynamicsInfo` of the base reports it.
 
-    Pairs are those that pybullet lets collide, by static bases, groups and masks. A `recorder`, set up before the scene
-    is built, adds what pybullet cannot be asked for: pair filters, the filter mode and self-collision. `pairs` and
-    `overlaps` take other choices. Groups and masks are read again with new bodies, when a base becomes static or ceases
-    to be, and when a recorder hears of a change.
+    Pairs are those that pybullet lets collide, by static bases, groups and masks. pybullet cannot be asked for pair
+    filters, the filter mode and self-collision. A `recorder` that is set up before the scene is built knows them.
+    `pairs` and `overlaps` take other choices. Groups and masks are read again when there are new bodies, when a base
+    becomes static or stops being static, and when a recorder hears of a change.
 
-    Height fields that a recorder has noted are modelled as the prisms below their triangles, near what may meet them;
-    behind what moves away they are released. `report()` counts all triangles, and as read those modelled.
+    Height fields that a recorder has noted are modelled as the prisms below their triangles. Only the prisms near other
+    shapes are modelled, and they are released when the shapes move away. `report()` counts all triangles as shapes, and
+    the modelled ones as read.
 
-    A body is called by the `names` given, by its number; an UnknownBodyWarning names those that are not there yet.
-    Other bodies are called by the stem of their file, which a recorder hears, by the name of their robot, or by their
-    mesh or kind of shape, whichever says most.
+    `names` are names of bodies by their numbers. An UnknownBodyWarning names the numbers that are not there yet. Other
+    bodies are called by the stem of their file, which a recorder hears, by the name of their robot, or by their mesh or
+    kind of shape. The most informative name is taken.
 
-    That a body collides with itself, and no recorder has heard of it, is seen in pybullet's contact points. overlaps()
-    says so with one SelfCollisionWarning.
+    If a body collides with itself and no recorder has heard of it, pybullet's contact points show it. overlaps() then
+    gives one SelfCollisionWarning.
 
-    A body without a finite pose is left out, and in `skipped`, until it has one again.
+    A body without a finite pose is left out and is in `skipped`, until it has a finite pose again.
 
-    Bodies that come, go or take over the id of another are noticed by `update()`, which marks every body with a user
-    data entry. `close()`, the end of a `with` or of the last `Bodies` of a client takes the marks off. New bodies are
-    read from a temporary .bullet file; if two stand at the same point, the friction of all is set and restored to tell
-    them apart. Bodies that another process adds to a shared simulation are noticed after `pybullet.syncBodyInfo()`. To
-    those that loadBullet brings pybullet gives no ids; they are counted in `skipped`.
+    `update()` notices bodies that come, go or take over the id of another body. It marks every body with a user data
+    entry. The marks are removed by `close()`, at the end of a `with`, and with the last `Bodies` of a client. New
+    bodies are read from a temporary .bullet file. If two bodies stand at the same point, the friction of all bodies is
+    set and restored to tell them apart. Bodies that another process adds to a shared simulation are noticed after
+    `pybullet.syncBodyInfo()`. pybullet gives no ids to bodies that loadBullet brings; `skipped` counts them.
 
-    TypeError if `physicsClientId` is no whole number. ValueError if it is not connected, the recorder is of another
+    TypeError if `physicsClientId` is not an integer. ValueError if it is not connected, the recorder is of another
     client, or a name is invalid.
     RuntimeError if the physics server writes where this process cannot read.
     """
@@ -93,5 +95,5 @@ class Bodies(AnyBodies):
 
     @property
     def recorder(self) -> Recorder | None:
-        """As it was given."""
+        """The recorder that was given."""
         return self._recorder

@@ -1,6 +1,6 @@
-"""A body read: its shapes as a temporary .bullet file has them, with the digits that pybullet's own report adds.
+"""The shapes of a body, read from a temporary .bullet file and refined by pybullet's own report.
 
-The file has all shapes, in single precision; the report does not have all of them.
+The file has all shapes in single precision. The report has double precision, but not all shapes.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ def read_body(
     loaded: Loaded | None = None,
     given: str | None = None,
 ) -> ModelledBody:
-    """A body as it is in a .bullet file, and in pybullet; `field` is the height field that it is known to be.
+    """A body, read from a .bullet file and from pybullet. `field` is its height field, if it is known to be one.
 
-    `loaded` says what file it comes from, `given` is the name that it has been given.
+    `loaded` tells the file that the body comes from. `given` is the name that the body was given.
     """
     base, own = (printable(text.decode(errors="replace")) for text in pybullet.getBodyInfo(id, client))
     joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
@@ -100,7 +100,7 @@ def read_body(
 
 
 def _name(client: int, id: int, own: str, loaded: Loaded | None, leaves: Mapping[int, tuple[Leaf, ...]]) -> str:
-    """The name of a body that was given none; empty if nothing says anything."""
+    """The name of a body without a given name; empty if there is no informative name."""
     meshes: list[str] = []
     only = leaves.get(BASE, ()) if pybullet.getNumJoints(id, client) == 0 else ()
     if only:
@@ -132,7 +132,7 @@ def _leaves(client: int, id: int, file: BulletFile, saved: SavedBody) -> dict[in
 def _in_double_precision(client: int, id: int, link: int, leaves: tuple[Leaf, ...]) -> tuple[Leaf, ...]:
     """The leaves of a link with the frames and dimensions that pybullet reports in full precision.
 
-    As they came if pybullet does not report all of them, or would print complaints.
+    Leaves are unchanged if pybullet does not report all of them, or would print complaints.
     """
     if not leaves or any(leaf.kind not in (*REPORTED.values(), *MESHES) for leaf in leaves):
         return leaves
@@ -169,13 +169,13 @@ def _reported(client: int, id: int, link: int) -> list[Leaf]:
 
 
 def _alike(saved: Leaf, reported: Leaf) -> bool:
-    """Whether two leaves are the same but for single precision."""
+    """Whether two leaves are equal up to single precision."""
     if saved.kind != reported.kind or saved.figures.shape != reported.figures.shape:
         return False
     shift, turn = _gaps(saved, reported)
     size = max(np.abs(reported.figures).max(), np.abs(reported.position).max())
     change = np.abs(saved.figures - reported.figures).max()
-    # Single precision is 6e-8; a few nested frames add up.
+    # Single precision is 6e-8. The errors of a few nested frames add up.
     return bool(max(shift, change) <= 1e-5 * size and turn <= 1e-5)
 
 

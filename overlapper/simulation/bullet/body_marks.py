@@ -1,4 +1,4 @@
-"""Marks by which the bodies of a pybullet client are known again: pybullet gives the ids of removed ones to others."""
+"""Marks that identify the bodies of a pybullet client. pybullet gives the id of a removed body to another body."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _held: Counter[str] = Counter()
 
 
 class BodyMarks:
-    """A user data entry on every body that has been read, shared by all that read the client in this process.
+    """A user data entry on every body that has been read. All readers of the client in this process share the entries.
 
-    Each has a key of its own, by which the body is told from a later one with its id. It goes when the body goes, or
-    when the last reader that knows the body by it is closed or collected.
+    Each entry has its own key, which tells the body from a later body with the same id. An entry is removed with its
+    body, or when the last reader that uses the entry is closed or collected.
 
-    pybullet tells of user data what this process has heard. It hears of another's changes, and of bodies after a
-    syncBodyInfo, only by a syncUserData, which takes as long as all the rest of an update.
+    pybullet reports only the user data known to this process. Changes by another process, and bodies found by
+    syncBodyInfo, need a syncUserData, which takes as long as all the rest of an update.
     """
 
     def __init__(self, client: int) -> None:
@@ -33,12 +33,12 @@ class BodyMarks:
         self._keys: dict[int, str] = {}
         self.close = weakref.finalize(self, _release, client, os.getpid(), self._keys)
         self._ids: list[int] = []
-        self._counts: list[int] = []  # of the entries of each body, ours and others'
-        self._places: list[int] = []  # of ours among them
+        self._counts: list[int] = []  # of all entries of each body
+        self._places: list[int] = []  # of our entry among them
         self._entries: list[tuple[object, ...]] = []
 
     def put(self, id: int) -> None:
-        """Know the body by its mark, and give it one if it has none. Needs a syncUserData before it."""
+        """Identify the body by its mark; a body without a mark gets one. Call syncUserData first."""
         key = _latest.get((self._client, id))
         if not key or _entry(self._client, id, key) < 0:
             key = _latest[self._client, id] = f"overlapper {uuid.uuid4()}"
@@ -49,11 +49,11 @@ class BodyMarks:
         self._keys[id] = key
 
     def is_on(self, id: int) -> bool:
-        """Whether the body is the one that was marked. Needs a syncUserData before it."""
+        """Whether the body is the one that was marked. Call syncUserData first."""
         return id in self._keys and _entry(self._client, id, self._keys[id]) >= 0
 
     def remember(self, ids: Iterable[int]) -> None:
-        """These are all bodies, and each is marked."""
+        """Remember the entries of these bodies. They are all bodies, and each is marked."""
         before = dict(zip(self._ids, zip(self._counts, self._places, self._entries)))
         self._ids = list(ids)
         for id in self._keys.keys() - {*self._ids}:
@@ -72,12 +72,12 @@ class BodyMarks:
             self._entries.append(entry)
 
     def are_as_remembered(self) -> bool:
-        """Whether there are the same bodies as then, as far as this process has heard."""
+        """Whether the bodies are the remembered ones, as far as this process knows."""
         client = self._client
         if pybullet.getNumBodies(client) != len(self._ids) or self._count() != self._counts:
             return False
-        # With the counts as they were, since pybullet reads beyond the end of a list that is shorter. The entry has to
-        # be in the list of the body: the key alone is found for a body long gone, too.
+        # The counts are compared first, as pybullet reads beyond the end of a shorter list. The entry must be in the
+        # list of the body, because pybullet finds the key of a removed body, too.
         return list(map(pybullet.getUserDataInfo, self._ids, self._places, repeat(client))) == self._entries
 
     def _count(self) -> list[int]:
@@ -90,13 +90,13 @@ def _entry(client: int, id: int, key: str) -> int:
 
 
 def _release(client: int, process: int, keys: dict[int, str]) -> None:
-    """Remove the entries by which no reader knows these bodies any more."""
+    """Remove the entries of these bodies that no reader uses any more."""
     _held.subtract(keys.values())
-    # A process that was forked off shares a physics server with its parent, whose marks these are.
+    # A forked process may share a physics server with its parent, and the marks belong to the parent.
     if os.getpid() != process or not pybullet.isConnected(client):
         return
     with contextlib.suppress(pybullet.error):  # of a server that has gone
-        # Without it pybullet finds entries of bodies that are gone.
+        # Without a sync, pybullet finds entries of removed bodies.
         pybullet.syncUserData(physicsClientId=client)
         for id, key in keys.items():
             if not _held[key] and (entry := _entry(client, id, key)) >= 0:

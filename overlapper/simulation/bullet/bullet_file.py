@@ -1,8 +1,8 @@
-"""Collision shapes out of the .bullet files that pybullet's `saveBullet` writes.
+"""Collision shapes from the .bullet files that pybullet's `saveBullet` writes.
 
-A .bullet file is a memory dump that describes itself. It has a header, then blocks, each an array of one C struct under
-the address it had in the writing process. The last block, "DNA1", has the layout of every struct. Pointers between
-blocks are those old addresses.
+A .bullet file is a memory dump that describes itself. It has a header and then blocks. Each block is an array of one C
+struct, with the address that the array had in the writing process. The last block, "DNA1", has the layout of every
+struct. Pointers between blocks are those old addresses.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from overlapper.printable import first_line
 from overlapper.simulation.model import Leaf
 
-# Bullet's BroadphaseNativeTypes, as far as pybullet creates them.
+# The BroadphaseNativeTypes of Bullet that pybullet creates.
 KINDS = {
     0: "box",
     4: "hull",
@@ -45,8 +45,8 @@ NAMES = {
     "RBDY": "btRigidBodyDoubleData",
 }
 
-# Bytes of figures for each byte of a file, beyond which shapes are not what they seem: three corners in doubles, 72
-# bytes, are three indices of 4 bytes in the file.
+# The most bytes of figures for each byte of an undamaged file. Three corners in doubles take 72 bytes; in the file they
+# are three indices of 4 bytes.
 MOST_READ = 64
 
 NUMBERS = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "float": "<f4", "double": "<f8"}
@@ -54,7 +54,7 @@ NUMBERS = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collider:
-    """A link's body for collisions: the address of its shape, its collision filter, and where it is.
+    """The collider of a link: the address of its `shape`, the `group` and `mask` of its collision filter, and its pose.
 
     `position` (3,) and `rotation` (3, 3) are those of the inertial frame in the world, in double precision.
     """
@@ -72,16 +72,16 @@ class Collider:
 
 
 def orientations(colliders: Sequence[Collider]) -> NDArray[np.float64]:
-    """(n, 4) unit quaternions xyzw, as `Collider.orientation` has them, in one go."""
+    """(n, 4) the `Collider.orientation` of many colliders, computed together."""
     return _quaternion(np.array([collider.rotation for collider in colliders]).reshape(-1, 3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SavedBody:
-    """A body of the file; the file knows no body ids.
+    """A body of the file. The file has no body ids.
 
-    `position` (3,) is the base's centre of mass in the world, to the bit what pybullet reports; `friction` the lateral
-    friction of the base. `colliders` are by link index, -1 for the base.
+    `position` (3,) is the base's centre of mass in the world, bit-identical to pybullet's report. `friction` is the
+    lateral friction of the base. `colliders` are by link index, -1 for the base.
     `links` is the number of links, 0 for a rigid body (maximal coordinates).
     """
 
@@ -121,7 +121,7 @@ class BulletFile:
             self.bodies = self._read_bodies(blocks)
 
     def leaves(self, address: int) -> tuple[Leaf, ...]:
-        """Leaf shapes of the collider shape at `address`, in the order in which pybullet lists them.
+        """Leaf shapes of the collider shape at `address`, in pybullet's order.
 
         ValueError if the file is damaged there.
         """
@@ -131,7 +131,7 @@ class BulletFile:
         return self._leaves[address]
 
     def pieces(self, address: int) -> list[int]:
-        """The number of leaves of each child of the compound at `address`; of another shape, its one.
+        """The number of leaves of each child of the compound at `address`; [1] for any other shape.
 
         ValueError if the file is damaged there.
         """
@@ -187,7 +187,7 @@ class BulletFile:
             if self._room < 0:
                 raise ValueError("path is a damaged .bullet file: its shapes are made of each other without end")
             convex = self._base(address, "btConvexInternalShapeData") if kind == "hull" else None
-            # The shortest decimal of a single precision number is the double that was once rounded to it.
+            # The shortest decimal of the single-precision number is the double that Bullet has rounded.
             margin = float(str(convex["m_collisionMargin"])) if convex is not None else 0.0
             return [Leaf(kind, position, _quaternion(rotation), figures, margin)]
         children = int(self._at(address)[0]["m_childShapePtr"])
@@ -209,7 +209,7 @@ class BulletFile:
         convex = self._base(address, "btConvexInternalShapeData")
         size = convex["m_implicitShapeDimensions"]["m_floats"][:3].astype(float)
         if kind in ("box", "cylinder"):
-            # Stored without the margin that Bullet lays around them again.
+            # The file has the half extents without the margin, which Bullet adds again.
             size += convex["m_collisionMargin"]
         if kind == "box":
             return kind, size
@@ -227,7 +227,7 @@ class BulletFile:
         return kind, np.array([size[0], 2 * size[2]])
 
     def _triangles(self, mesh: Any) -> NDArray[np.float64]:
-        """The triangles (t, 3, 3) of a striding mesh, which pybullet indexes in 32 bits."""
+        """The triangles (t, 3, 3) of a striding mesh. pybullet uses 32-bit indices."""
         scaling = mesh["m_scaling"]["m_floats"][:3].astype(float)
         parts = self._at(int(mesh["m_meshPartsPtr"])) if mesh["m_meshPartsPtr"] else ()
         corners = [
@@ -239,7 +239,7 @@ class BulletFile:
         return triangles
 
     def _base(self, address: int, name: str) -> Any:
-        """The shape at `address` as its C++ base class: every shape struct begins with that of its base."""
+        """The shape at `address` as its C++ base class. Every shape struct begins with the struct of its base class."""
         return np.frombuffer(self._data, self._layouts.dtype(name), 1, self._by_address[address].offset)[0]
 
     def _at(self, address: int) -> NDArray[np.void]:
@@ -252,7 +252,7 @@ class BulletFile:
 
 @contextmanager
 def _damage() -> Iterator[None]:
-    """One ValueError for every error that damaged bytes lead to."""
+    """Turn every error that damaged bytes cause into a ValueError."""
     causes = (KeyError, IndexError, StopIteration, struct.error, RecursionError, OverflowError, TypeError)
     try:
         with np.errstate(over="ignore", invalid="ignore"):
@@ -281,7 +281,7 @@ def _colliders(records: NDArray[np.void]) -> list[Collider]:
 
 
 def _blocks(data: bytes) -> list[Block]:
-    """Directory of the file; the last block is the DNA, whose length some writers leave open."""
+    """The blocks of the file. The last block is the DNA, whose length some writers do not set."""
     blocks: list[Block] = []
     start = 12
     while not blocks or blocks[-1].code != "DNA1":
@@ -296,7 +296,7 @@ def _blocks(data: bytes) -> list[Block]:
 
 
 class Layouts:
-    """The structs of a file as numpy dtypes, made when first asked for."""
+    """The structs of a file as numpy dtypes. A dtype is made on first use."""
 
     def __init__(self, structs: dict[str, list[tuple[str, str]]], sizes: dict[str, int]) -> None:
         self.names = list(structs)
@@ -324,7 +324,7 @@ class Layouts:
 def _layouts(dna: bytes) -> Layouts:
     """Read the DNA block: field names, type names, type sizes, and structs as pairs of a type and a name.
 
-    Bullet compiles it in, so that all files of one build share it.
+    The DNA is compiled into Bullet, so all files of one build share it.
     """
     names, end = _strings(dna, 4)
     types, end = _strings(dna, end)
@@ -351,7 +351,7 @@ def _aligned(offset: int) -> int:
 
 
 def _quaternion(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Nearest xyzw quaternions (..., 4) of rotation matrices (..., 3, 3) that are orthogonal to single precision only.
+    """Nearest xyzw quaternions (..., 4) of matrices (..., 3, 3) that are orthogonal only to single precision.
 
     (Bar-Itzhack 2000)
     """

@@ -1,4 +1,4 @@
-"""pybullet's functions, heard by whoever wants to know what a script tells the simulator, and what it answers."""
+"""Listeners to the calls of pybullet's functions, with their arguments and results."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pybullet
 
 __stands_in__ = "pybullet"  # so that tracebacks of scripts end before the frames of this module
 
-# The calls that can be heard, with their parameters in pybullet's order, as far as they are needed.
+# The calls that can be heard, with the needed parameters in pybullet's order.
 CALLS: dict[str, tuple[str, ...]] = {
     "connect": ("method",),
     "stepSimulation": ("physicsClientId",),
@@ -84,7 +84,7 @@ _listeners: list[Listener] = []
 
 
 def listen(listener: Listener) -> None:
-    """Let all CALLS of all clients be heard: they are replaced in the module `pybullet` by ones that call them."""
+    """Add a listener to all CALLS of all clients. The functions of `pybullet` are replaced by wrappers meanwhile."""
     if not _listeners:
         _ORIGINALS.update({name: getattr(pybullet, name) for name in CALLS})
         for name in CALLS:
@@ -93,7 +93,7 @@ def listen(listener: Listener) -> None:
 
 
 def unlisten(listener: Listener) -> None:
-    """Let a listener hear nothing any more; once nobody listens, pybullet is as before."""
+    """Remove a listener. After the last listener is removed, pybullet has its own functions again."""
     if listener in _listeners:
         _listeners.remove(listener)
         if not _listeners:
@@ -102,19 +102,19 @@ def unlisten(listener: Listener) -> None:
 
 
 def unheard(name: str) -> Callable[..., Any]:
-    """The function of pybullet of that name; listeners do not hear its calls."""
+    """The function of pybullet with that name. Listeners do not hear its calls."""
     function: Callable[..., Any] = _ORIGINALS[name] if _listeners else getattr(pybullet, name)
     return function
 
 
 def tell(name: str, arguments: Arguments) -> None:
-    """Let a call be heard that was made, or made of several, unheard."""
+    """Report to the listeners one call that was made by one or more unheard calls."""
     for listener in tuple(_listeners):
         listener(name, arguments, None)
 
 
 class _Heard:
-    """A function of pybullet that listeners hear of."""
+    """A function of pybullet whose calls are reported to listeners."""
 
     def __init__(self, name: str) -> None:
         functools.update_wrapper(self, _ORIGINALS[name])
@@ -122,7 +122,7 @@ class _Heard:
 
     @property  # type: ignore[misc]
     def __class__(self) -> type:
-        # pybullet_utils.bullet_client hands its client's id to what inspect.isbuiltin finds, and to nothing else.
+        # pybullet_utils.bullet_client passes its client id only to functions for which inspect.isbuiltin is true.
         return types.BuiltinFunctionType
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:

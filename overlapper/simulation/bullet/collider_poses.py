@@ -1,4 +1,4 @@
-"""Where the links of a pybullet client are, read at every step."""
+"""The poses of the links of a pybullet client, read at every step."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from overlapper.simulation.model import BASE
 
 
 class ColliderPoses:
-    """The inertial frames of bases and links, which shapes are fixed to, and which bases are static.
+    """The inertial frames of the bases and links that shapes are fixed to, and which bases are static.
 
-    `colliders` are (body, link) of each frame; `static` is in the order of `bodies`.
+    `colliders` are (body, link) of each frame. `static` is in the order of `bodies`.
     """
 
     def __init__(self, client: int, links: Mapping[int, Sequence[int]], hidden: Mapping[int, int]) -> None:
-        """`links` by body are those wanted beside its base; `hidden` bodies have these places in a .bullet file."""
+        """`links` by body are read in addition to its base. `hidden` has places of bodies in a .bullet file."""
         self._client = client
         self._hidden = [(hidden[id], links[id]) for id in links if id in hidden]
         self._seen = [id for id in links if id not in hidden]
@@ -33,7 +33,7 @@ class ColliderPoses:
         self.static = [True] * len(self.bodies)
 
     def read(self) -> list[Pose]:
-        """Read the frames again, and which bases are static."""
+        """Read the frames and which bases are static."""
         client, before = self._client, self._latest or [()] * len(self.bodies)
         saved = self._saved_frames() if self._hidden else {}
         frames: list[Pose] = list(map(pybullet.getBasePositionAndOrientation, self._seen, repeat(client)))
@@ -43,8 +43,8 @@ class ColliderPoses:
             frames += pybullet.getLinkStates(id, links, computeForwardKinematics=1, physicsClientId=client)
         frames += [saved[row, link] for row, links in self._hidden for link in links]
         self._latest = frames
-        # changeDynamics may turn a static body into a moving one, and back. A body that has moved of itself is not
-        # static; one that is moved by hand is asked once it rests.
+        # changeDynamics may make a static body dynamic, and back. A body that the simulation has moved is not static. A
+        # body that a script has moved is asked when it rests.
         for k, id in enumerate(self.bodies):
             if self.static[k] or frames[k] == before[k]:
                 self.static[k] = pybullet.getDynamicsInfo(id, BASE, client)[0] == 0

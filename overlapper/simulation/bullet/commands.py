@@ -1,4 +1,4 @@
-"""The commands that a script gives motors, constraints and bodies between two steps, given again in each substep."""
+"""Commands of a script to motors, constraints and bodies between two steps. They are repeated in each substep."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PUSHES = frozenset({"applyExternalForce", "applyExternalTorque"})
 
 COMMANDS = MOTORS | PUSHES | {"changeConstraint", "resetSimulation", "stepSimulation"}
 
-# The gains that pybullet takes by default: parts of an error that a step takes away.
+# The default gains of pybullet: the fraction of an error that a step removes.
 DEFAULT_GAINS = {"positionGain": 0.1, "velocityGain": 1.0}
 
 MAX_FORCE, DEFAULT_MAX_FORCE = 10, 500.0  # of getConstraintInfo
@@ -26,23 +26,23 @@ Command = tuple[str, Arguments]
 class Commands:
     """The commands of a client that depend on the length of a step, as far as they are heard.
 
-    pybullet keeps the force of a motor or a constraint as an impulse, by the length that a step has then. In shorter
-    steps it would be so much stronger. Gains are parts of an error that a step takes away: in shorter steps a motor
-    would be so much faster. Forces, and torques of joints, act in one step alone.
+    pybullet keeps the force of a motor or a constraint as an impulse: force times the length of a step at that time. In
+    shorter steps the force would be stronger. A gain is the fraction of an error that a step removes. In shorter steps
+    a motor would be faster. Forces, and torques of joints, act in one step only.
     """
 
     def __init__(self, client: int) -> None:
         self._client = client
         self.restored = 0
-        """How often the bodies were put back to a state that was saved."""
-        self._lasting: dict[Any, Command] = {}  # by body and joint, or by constraint, in the order that they came
+        """How often a saved state of the bodies was restored."""
+        self._lasting: dict[Any, Command] = {}  # by body and joint, or by constraint, in the order of the calls
         self._momentary: list[Command] = []
-        self._length = 0.0  # of the steps that lasting ones have been told for
+        self._length = 0.0  # of the steps for which the lasting commands were last repeated
 
     def learn(self) -> None:
-        """Take the forces of constraints from pybullet that were set before anybody listened.
+        """Read from pybullet the forces of constraints that were set before anybody listened.
 
-        For a constraint without a force of its own pybullet reports its default, which is not an impulse of a step.
+        If no force was set for a constraint, pybullet reports the default, which is not kept as an impulse.
         """
         client = self._client
         for k in range(pybullet.getNumConstraints(client)):
@@ -53,9 +53,10 @@ class Commands:
                 self._keep([constraint], ("changeConstraint", told))
 
     def prepare(self, length: float, first: bool, share: float = 1.0) -> None:
-        """Tell them again for a substep as long as that (s), the `first` of a step or a later one.
+        """Repeat the commands for a substep of this `length` (s), the `first` of a step or a later one.
 
-        The simulator's time step has to be that long already, which is that `share` of what the script takes for one.
+        The simulator's time step must already have this length. `share` is the length divided by the script's time
+        step.
         """
         if length != self._length:
             for name, arguments in {id(each): each for each in self._lasting.values()}.values():
@@ -66,7 +67,7 @@ class Commands:
                 self._tell(name, arguments)
 
     def stepped(self) -> None:
-        """A step is over: forces act no more."""
+        """A step is over: forces of the script no longer act."""
         self._momentary.clear()
 
     def _tell(self, name: str, arguments: Arguments, kept: Arguments | None = None) -> None:
@@ -83,7 +84,7 @@ class Commands:
         self.restored += name == "restoreState"
         if name not in COMMANDS:
             return
-        # A script may use its lists again.
+        # The script may change its lists later.
         command = name, deepcopy(arguments)
         if name in PUSHES or (name in MOTORS and arguments.get("controlMode") == pybullet.TORQUE_CONTROL):
             self._momentary.append(command)
@@ -92,7 +93,7 @@ class Commands:
             joints = arguments["jointIndices"] if name in ARRAYS else [arguments["jointIndex"]]
             self._keep([(body, joint) for joint in joints], command)
         elif name == "changeConstraint":
-            # An argument that a call leaves out stays as it was.
+            # An argument that a call leaves out keeps its value.
             constraint = arguments["userConstraintUniqueId"]
             before = self._lasting.get(constraint, command)[1]
             self._keep([constraint], (name, before | command[1]))
@@ -101,7 +102,7 @@ class Commands:
             return
         else:
             self._lasting, self._momentary = {}, []
-        # It was told for the length that steps have between two of ours.
+        # pybullet took the command for the script's step length, which is not that of our substeps.
         self._length = 0.0
 
     def _keep(self, keys: list[Any], command: Command) -> None:
@@ -111,7 +112,7 @@ class Commands:
 
 
 def _gains(name: str, arguments: Arguments, share: float) -> Arguments:
-    """The gains of a motor, for steps that are that share of those that it was meant for."""
+    """The gains of a motor for steps whose length is this share of the script's time step."""
     mode = arguments.get("controlMode")
     if share == 1 or mode not in (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL):
         return {}
@@ -121,7 +122,7 @@ def _gains(name: str, arguments: Arguments, share: float) -> Arguments:
         [*arguments[gain + s]] if name in ARRAYS and gain + s in arguments else [arguments.get(gain, default)] * many
         for gain, default in DEFAULT_GAINS.items()
     )
-    # After all parts of a step, as much of an error in the velocity is left as after one whole step.
+    # After all substeps of a step, the same velocity error is left as after one whole step.
     slower = [1 - (1 - each) ** share if 0 <= each <= 1 else each for each in velocities]
     told: dict[str, list[float]] = {"velocityGain": slower}
     if mode == pybullet.POSITION_CONTROL:

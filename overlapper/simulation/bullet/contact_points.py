@@ -1,4 +1,4 @@
-"""Pybullet's own contact points between links in which no overlap is found."""
+"""pybullet's contact points between links, where no overlap is found."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DISTANCE = 8  # of a contact point
 
 
 def links_in_contact_with_each_other(client: int, body: int) -> tuple[int, int] | None:
-    """Two links of a body that Bullet keeps apart, -1 for the base; None if there are none."""
+    """Two links of a body between which Bullet has a contact point, -1 for the base; None if there are none."""
     points = pybullet.getContactPoints(body, body, physicsClientId=client)
     return (points[0][3], points[0][4]) if points else None
 
@@ -27,16 +27,16 @@ def links_in_contact_with_each_other(client: int, body: int) -> tuple[int, int] 
 def touching_within_margins(
     client: int, found: Contacts, layout: Layout, chosen: Callable[[NDArray[np.int32]], Mask]
 ) -> int:
-    """How many pairs of links that are `chosen` touch in Bullet and not in `found`, one of them by a hull.
+    """The number of `chosen` pairs of links, one with a hull, that touch in Bullet but are not in `found`.
 
-    Bullet lays a margin around hulls, and its contact points are of the surfaces with margins. They are those of its
-    last collision detection.
+    Bullet lays a margin around hulls, and its contact points lie on the surfaces with margins. They are from its last
+    collision detection.
     """
     links = _touching(client) - {((a, la), (b, lb)) for a, la, _, b, lb, _ in found.keys.tolist()}
     starts = np.searchsorted(layout.colliders, np.arange(len(layout.collider_rows) + 1))
     widened = [facts(shape).bullet_margin for shape in layout.shapes]
     pairs: list[tuple[int, int]] = []
-    number: list[int] = []  # of the links that each is of
+    number: list[int] = []  # for each pair of shapes: the index of its pair of links
     for k, (a, b) in enumerate(links):
         if a in layout.collider_rows and b in layout.collider_rows:
             first, second = (
@@ -50,7 +50,7 @@ def touching_within_margins(
 
 
 def _touching(client: int) -> set[tuple[LinkKey, LinkKey]]:
-    """The links between which Bullet has contact points at which they touch, the lesser first."""
+    """The pairs of links that touch at a contact point of Bullet, the lesser first."""
     points = pybullet.getContactPoints(physicsClientId=client)
     pairs = (sorted([(each[1], each[3]), (each[2], each[4])]) for each in points if each[DISTANCE] <= 0)
     return {(first, second) for first, second in pairs}

@@ -1,4 +1,4 @@
-"""The bodies of a pybullet client as masses and joints, and how they move."""
+"""The bodies of a pybullet client as masses and joints, and their velocities."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ HELD = (-1, 0, np.zeros(3), np.zeros(3))  # a base: no parent, no joint
 class BulletDynamics:
     """See `Dynamics`: the links of some bodies, base by base, and the `solver` that knows their masses and joints.
 
-    `links` are (body, link) in the solver's order, `place` the place of each there, `friction` (n,) their coefficients.
+    `links` are (body, link) in the solver's order, and `place` is the index of each. `friction` (n,) has coefficients.
     """
 
     def __init__(self, client: int, bodies: Sequence[int]) -> None:
@@ -33,12 +33,12 @@ class BulletDynamics:
         self._joints = {id: [*range(pybullet.getNumJoints(id, client))] for id in bodies}
         self.links = [(id, link) for id, joints in self._joints.items() for link in (BASE, *joints)]
         self.place = {each: k for k, each in enumerate(self.links)}
-        self._masses: list[Any] = [None]  # of no links, not even none
+        self._masses: list[Any] = [None]  # equals no real list of masses, so that the first `read` makes a solver
         self.friction: Array = np.zeros(len(self.links))
         self.read()
 
     def read(self) -> bool:
-        """Read masses and coefficients of friction anew; True if there is a new solver, as a mass is another."""
+        """Read masses and friction again. True if a mass or inertia has changed, so that there is a new solver."""
         told = [pybullet.getDynamicsInfo(id, link, self._client) for id, link in self.links]
         self.friction = np.array([each[FRICTION] for each in told])
         masses = [(each[MASS], each[INERTIA]) for each in told]
@@ -50,7 +50,7 @@ class BulletDynamics:
 
     @property
     def gravity(self) -> Array:
-        """The acceleration of all coordinates that is known before anything has moved: gravity on free bases."""
+        """The acceleration of all coordinates that is known before any motion: gravity on free bases."""
         told = pybullet.getPhysicsEngineParameters(self._client)
         down = [told[f"gravityAcceleration{axis}"] for axis in "XYZ"]
         found = np.zeros(self.solver.coordinates)
@@ -63,7 +63,7 @@ class BulletDynamics:
         client = self._client
         rows: list[tuple[Any, ...]] = []
         self._bases: dict[tuple[int, int], int] = {}  # the first coordinate of each
-        # By body: joints of one and of three coordinates, and the coordinates that these are.
+        # By body: joints with one and with three coordinates, and the indices of their coordinates.
         self._single: list[tuple[int, list[int], list[int]]] = []
         self._spherical: list[tuple[int, list[int], list[int]]] = []
         at = 0
@@ -80,7 +80,7 @@ class BulletDynamics:
                 parent = 1 + told[16]
                 between = joint_between(client, id, told, poses[parent], poses[1 + joint])
                 number, coordinates = JOINTS[between.kind]
-                # Bullet turns by the unit axis, but moves by the axis as it is in the file.
+                # Bullet rotates about the unit axis, but translates along the axis as given in the file.
                 axis = rotated(between.orientation, np.array(told[13]))
                 rows.append((first + parent, number, axis, between.position))
                 if coordinates:
@@ -99,7 +99,7 @@ class BulletDynamics:
         )
 
     def frames(self) -> list[Any]:
-        """The inertial frames of the links: pybullet's answers, which begin with position and quaternion."""
+        """The inertial frames of the links: tuples of pybullet that begin with position and quaternion."""
         return [each for body in self._frames_by_body() for each in body]
 
     def _frames_by_body(self) -> list[list[Any]]:

@@ -1,4 +1,4 @@
-"""The engine of pybullet: scenes run in clients of their own, and the steps of a client are noticed by its calls."""
+"""The engine of pybullet. Each scene runs in its own client, and steps are noticed by calls of stepSimulation."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Client:
 
     def end(self) -> None:
         self.leave()
-        with suppress(pybullet.error):  # somebody else has ended it
+        with suppress(pybullet.error):  # the client is already disconnected
             pybullet.disconnect(self._client)
 
 

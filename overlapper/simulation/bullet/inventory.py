@@ -1,6 +1,6 @@
-"""The list of what is modelled of a file for pybullet: every shape, and which links the simulator lets collide.
+"""The inventory of a file for pybullet: every modelled shape, and which links the simulator lets collide.
 
-It is read in a process of its own (`overlapper.simulation.bullet.model_file`).
+The file is read in a separate process (`overlapper.simulation.bullet.model_file`).
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ Listed = dict[tuple[int, int], list[Placed]]
 
 @dataclass(frozen=True, slots=True)
 class ListedShape:
-    """A modelled shape. `size` says its dimensions in m, `box` (3,) are the sides of the box around it as loaded.
+    """A modelled shape. `size` has its dimensions in m. `box` (3,) has the sides of its bounding box as loaded.
 
-    `corners` is 0 for all but hulls; `volume` (m³) and `box` are infinite for a plane.
+    `corners` is 0 except for hulls. `volume` (m³) and `box` are infinite for a plane.
     """
 
     kind: str
@@ -39,7 +39,7 @@ class ListedShape:
 
 @dataclass(frozen=True, slots=True)
 class ListedLink:
-    """A link (-1 is the base) that has shapes; it `meets` so many other links of the file, as the simulator has it."""
+    """A link (-1 is the base) that has shapes. The simulator lets it collide with `meets` other links of the file."""
 
     body: int
     link: int
@@ -61,7 +61,7 @@ class Inventory:
     decomposed: tuple[tuple[str, int], ...]  # name and number of convex parts
 
     def as_dict(self) -> dict[str, Any]:
-        """As JSON takes it, which has no infinity."""
+        """The inventory for JSON: infinite values become None."""
         made = asdict(self)
         for link in made["links"]:
             for shape in link["shapes"]:
@@ -74,14 +74,14 @@ def inventory(path: Path, self_collision: bool = False, modelling: Modelling = M
     """The inventory of a URDF, SDF, MJCF or .bullet file.
 
     With `self_collision` a URDF or MJCF model is loaded with pybullet's URDF_USE_SELF_COLLISION. NotRead if the file is
-    not there, or pybullet refuses it or dies of it.
+    missing, or if pybullet refuses it or crashes.
     """
     found: Inventory = read_apart(path, _answers, (path, self_collision, modelling))
     return found
 
 
 def _answers(request: tuple[Path, bool, Modelling]) -> Generator[Inventory | str, None, None]:
-    """In the process in which pybullet reads the file: what is in it, or the reason why it cannot be read."""
+    """The inventory, or the reason why the file cannot be read. This runs in the process that reads the file."""
     try:
         yield (yield from _read(*request))
     except (NotRead, ValueError) as error:
@@ -102,7 +102,7 @@ def _read(path: Path, self_collision: bool, modelling: Modelling) -> Generator[s
         load(path, client, pybullet.URDF_USE_SELF_COLLISION if self_collision else 0)
         yield LOADED
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of shapes left out, which the inventory names
+            warnings.simplefilter("ignore", UserWarning)  # the inventory names the skipped shapes
             bodies = Bodies(client, recorder=recorder, **settings_of(modelling))
     listed: Listed = {}
     for (body, link, _), placed in zip(bodies.keys, bodies.placed):
@@ -123,7 +123,7 @@ def _read(path: Path, self_collision: bool, modelling: Modelling) -> Generator[s
 
 
 def _of_bullet_file(path: Path, modelling: Modelling) -> Inventory:
-    """The inventory of a file that saveBullet wrote, and loadBullet would not load whole. Its bodies have no names."""
+    """The inventory of a file of saveBullet, read directly, as loadBullet loads only part. Its bodies have no names."""
     from overlapper.simulation.bullet.bullet_file import BulletFile
     from overlapper.simulation.collision_rules import Colliders, MaskRules, partners
     from overlapper.simulation.modelling import in_one_sentence, modelled

@@ -1,6 +1,6 @@
 """The links and joints of a file that pybullet loads.
 
-pybullet may die of a file: whoever reads one does so in a process of its own, by `model_file.read_apart`.
+A file may kill pybullet, so it is read in a separate process, by `model_file.read_apart`.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ KINDS: dict[int, Kind] = {
 
 
 def kinematic_tree(path: Path, root: Element, modelling: Modelling) -> Generator[str, None, KinematicTree]:
-    """The links of a URDF, SDF or MJCF file, whose text has this root. LOADED comes first, when pybullet has the file.
+    """The links of a URDF, SDF or MJCF file whose text has this root. Yields LOADED when pybullet has loaded the file.
 
-    NotRead if pybullet refuses the file, or would take it for something else than it says.
+    NotRead if pybullet refuses the file, or would make another model of it.
     """
     import pybullet
 
@@ -81,7 +81,7 @@ def kinematic_tree(path: Path, root: Element, modelling: Modelling) -> Generator
 def _joints(client: int, id: int, name: str) -> list[Joint]:
     """The joint that ties the base to the world where it was loaded, and the joints of a body.
 
-    NotRead if pybullet does not tell where its links are.
+    NotRead if pybullet does not report the poses of its links.
     """
     import pybullet
 
@@ -97,13 +97,13 @@ def _joints(client: int, id: int, name: str) -> list[Joint]:
 
 
 def joint_between(client: int, id: int, told: Any, parent: Any, link: Any) -> Joint:
-    """A joint by what pybullet tells of it, and by the inertial frames of its two links as they are now."""
+    """A joint, from pybullet's joint info `told` and the present inertial frames of its two links."""
     import pybullet
 
     number, name, type_ = told[:3]
     kind = KINDS.get(type_, "held")
     axis, position = np.array(told[13]), np.array(told[14])
-    # Pybullet tells the rotation from the axes of the parent to those of the joint.
+    # Pybullet reports the rotation from the axes of the parent to the axes of the joint.
     orientation = np.array(told[15]) * [-1, -1, -1, 1]
     if kind == "revolute":
         axis = axis / np.linalg.norm(axis)
@@ -115,7 +115,7 @@ def joint_between(client: int, id: int, told: Any, parent: Any, link: Any) -> Jo
         shift = axis * state[0]
     elif kind == "spherical":
         turn = state
-    # MJCF joints are where they say, and not at the origin of the link: how far that is, only the poses tell.
+    # An MJCF joint need not be at the origin of its link. Only the poses tell the offset.
     axes = composed(parent[1], orientation)
     pivot = parent[0] + rotated(parent[1], position) + rotated(axes, shift)
     offset = rotated(composed(axes, turn) * [-1, -1, -1, 1], link[0] - pivot)

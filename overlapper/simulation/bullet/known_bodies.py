@@ -1,4 +1,4 @@
-"""The bodies of a pybullet client that have been read: new ones are noticed, and those that go."""
+"""The bodies of a pybullet client that have been read. New and removed bodies are noticed."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from overlapper.simulation.settings import Modelling
 
 
 class KnownBodies:
-    """`by_id` are the bodies, sorted; each is read once, and again when its margin or its heights have changed.
+    """The bodies `by_id`, sorted. A body is read once, and read again when its margin or its heights have changed.
 
-    `unidentified` is the number of bodies without an id. `hidden` are the places in a .bullet file of those whose poses
-    have no other source. `filters` are group and mask by body and link, as they were when the last body was read, or at
-    the last `read_filters`.
+    `unidentified` is the number of bodies without an id. `hidden` has the bodies whose poses only a .bullet file tells,
+    with their places in the file. `filters` are group and mask by body and link. They were read with the last new body,
+    or at the last `read_filters`.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class KnownBodies:
         self.filters: dict[tuple[int, int], tuple[int, int]] = {}
 
     def refresh(self) -> list[Skipped] | None:
-        """Read what is new; None if nothing has come or gone, else what is newly skipped."""
+        """Read new bodies. Returns None if no body has come or gone, otherwise the newly skipped shapes."""
         loaded = self._scene_loaded()
         changed = self._margins_changed() | self._ground_changed() | loaded
         if not changed and self._marks.are_as_remembered():
@@ -58,7 +58,7 @@ class KnownBodies:
         self._marks.close()
 
     def read_filters(self) -> None:
-        """Read groups and masks again, of the same bodies."""
+        """Read the groups and masks of the same bodies again."""
         file, rows, _ = saved_bodies(self._client, sorted(self.by_id))
         self._take_filters(file, rows)
 
@@ -72,7 +72,7 @@ class KnownBodies:
         return [Skipped(-1, BASE, number, reason)]
 
     def _margins_changed(self) -> bool:
-        """Whether a base has another margin than before, where that counts; its body is then new."""
+        """Whether a base has another margin than before, if margins are modelled. Its body is then read anew."""
         if self._modelling.surface == "nominal":
             return False
         shaped = {id for id, body in self.by_id.items() if body.shapes or body.ground}
@@ -83,7 +83,7 @@ class KnownBodies:
         return bool(changed)
 
     def _ground_changed(self) -> bool:
-        """Whether a height field has been given other heights; its body is then new."""
+        """Whether a height field has been given other heights. Its body is then read anew."""
         grounds = {id: body.ground for id, body in self.by_id.items() if body.ground}
         for id, ground in grounds.items():
             if self._recorder and self._recorder.height_field(id) is not ground.field:
@@ -91,15 +91,15 @@ class KnownBodies:
         return len(grounds) > sum(1 for id in grounds if id in self.by_id)
 
     def _scene_loaded(self) -> bool:
-        """Whether bodies may have come that pybullet tells nothing of."""
+        """Whether there may be new bodies that pybullet does not list."""
         loaded = self._recorder.scenes_loaded if self._recorder else 0
         before, self._scenes_loaded = self._scenes_loaded, loaded
         return loaded != before
 
     def _read(self, loaded: bool) -> list[Skipped]:
-        """Read the bodies that are not marked yet, forget those that are gone; what is newly skipped.
+        """Read the bodies that are not marked yet and forget removed bodies. Returns the newly skipped shapes.
 
-        If a scene has been `loaded`, there may be others that pybullet tells nothing of.
+        If a scene has been `loaded`, there may be more bodies, which pybullet does not list.
         """
         client = self._client
         ids, known = self._still_known()
@@ -107,8 +107,8 @@ class KnownBodies:
         if loaded or not ids or len(known) < len(ids) or self.hidden:
             file, rows, hidden = saved_bodies(client, ids)
             if len(rows) < len(file.bodies):
-                # Before a sync, only the last of the bodies is known that createMultiBody makes from batchPositions.
-                # Without them, a sync is left out, as it takes longer than all the rest.
+                # createMultiBody with batchPositions makes many bodies, and only a sync makes all but the last known.
+                # Otherwise there is no sync, as it takes longer than all the rest.
                 pybullet.syncBodyInfo(client)
                 pybullet.syncUserData(physicsClientId=client)
                 ids, known = self._still_known()
@@ -136,7 +136,7 @@ class KnownBodies:
     def _add_lost(
         self, fresh: Collection[int], known: dict[int, ModelledBody], file: BulletFile, rows: Mapping[int, int]
     ) -> None:
-        """Let bodies know of shapes that their files name, and that pybullet has not built."""
+        """Add the shapes that are named in files, but that pybullet has not built, to `skipped` of their bodies."""
         loads = self._recorder.loaded if self._recorder else {}
         for loaded in dict.fromkeys(loads[id] for id in fresh if id in loads):
             lost, absent = lost_of(loaded, self._client, file, rows)
@@ -146,7 +146,7 @@ class KnownBodies:
                 known[id] = with_lost(known[id], Skipped(id, link, f"{known[id].name}/{name}", reason))
 
     def _still_known(self) -> tuple[list[int], dict[int, ModelledBody]]:
-        """The ids of all bodies, sorted, and of those that have been read what they are."""
+        """The ids of all bodies, sorted, and the bodies among them that have been read."""
         ids = sorted(body_ids(self._client))
         return ids, {id: self.by_id[id] for id in ids if id in self.by_id and self._marks.is_on(id)}
 
@@ -159,7 +159,7 @@ class KnownBodies:
 
 
 def with_lost(body: ModelledBody, lost: Skipped) -> ModelledBody:
-    """A body that knows of lost shapes of a link, in one entry with others of that link that are left out."""
+    """The body with lost shapes of a link added, in one entry with other skipped shapes of that link."""
     same = [each for each in body.skipped if each.name == lost.name]
     others = tuple(each for each in body.skipped if each.name != lost.name)
     reason = "; ".join([lost.reason, *(each.reason for each in same)])
@@ -167,5 +167,5 @@ def with_lost(body: ModelledBody, lost: Skipped) -> ModelledBody:
 
 
 def _margin(client: int, id: int) -> float:
-    """The margin of the outermost shape of a base, as Bullet has it."""
+    """The margin of the outermost shape of a base in Bullet."""
     return float(pybullet.getDynamicsInfo(id, BASE, client)[11])

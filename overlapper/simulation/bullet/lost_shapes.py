@@ -1,4 +1,4 @@
-"""Collision shapes that a model names and pybullet has not built: it passes over meshes that it cannot read."""
+"""Collision shapes that a model names and pybullet has not built, because it ignores meshes that it cannot read."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from overlapper.simulation.model import BASE, LinkKey
 
 NOT_BUILT = "pybullet has not built its shapes"
 
-# With these, pybullet makes other links of a file than it names, or none of its shapes.
+# With these flags, pybullet makes other links than the file names, or none of its shapes.
 OTHERWISE = pybullet.URDF_MERGE_FIXED_LINKS | pybullet.URDF_IGNORE_COLLISION_SHAPES
 
 
 def lost_of(
     loaded: Loaded, client: int, file: BulletFile, rows: Mapping[int, int]
 ) -> tuple[dict[LinkKey, str], list[str]]:
-    """The shapes that are lost of the bodies that were loaded together, as `lost_shapes` has them.
+    """The lost shapes of bodies that were loaded together, in the form of `lost_shapes`.
 
-    None where the file cannot be known: it is not where it was, it is no XML, or pybullet makes other links of it.
+    The result is empty if the file was moved, is not XML, or if pybullet makes other links of it.
     """
     path, there = loaded.place, {id: rows[id] for id in loaded.bodies if id in rows}
     if path is None or loaded.flags & OTHERWISE or len(there) < len(loaded.bodies):
@@ -47,9 +47,9 @@ def lost_of(
 def lost_shapes(
     path: Path, root: Element, client: int, file: BulletFile, rows: Mapping[int, int]
 ) -> tuple[dict[LinkKey, str], list[str]]:
-    """Why links have fewer shapes than the model names, by body and link; and the names of links that are not there.
+    """Why links have fewer shapes than the model names, by body and link; and the names of missing links.
 
-    `root` is the root of the model, and `rows` are the places in `file` of the bodies that pybullet has made of it.
+    `root` is the root of the model. `rows` are the places in `file` of the bodies that pybullet has made of the model.
     """
     named = named_shapes(path, root)
     lost: dict[LinkKey, str] = {}
@@ -85,7 +85,7 @@ def _files(client: int, id: int, link: int) -> list[str]:
 def _reason(expected: Sequence[str], pieces: Sequence[int], files: Sequence[str] | None) -> str:
     """Why a link has fewer shapes than `expected`, "" if it has as many.
 
-    `pieces` are the numbers of convex shapes of each of its shapes. An only shape may come as its convex shapes.
+    `pieces` are the numbers of convex shapes of each of its shapes. A single shape may be saved as its convex shapes.
     `files` are those that pybullet reports, None if it cannot be asked.
     """
     there = min(1, sum(pieces)) if len(expected) == 1 else sum(map(bool, pieces))
@@ -100,7 +100,7 @@ def _reason(expected: Sequence[str], pieces: Sequence[int], files: Sequence[str]
 
 
 def _is_among(shape: str, files: Sequence[str]) -> bool:
-    """Whether a shape is reported; primitives are reported without a file, a cylinder of a URDF as an unknown one."""
+    """Whether a shape is reported. Primitives have no file, and a cylinder of a URDF has an unknown file."""
     if "." in shape:
         return any(file.endswith(Path(shape).name) for file in files)
     return not {"", "unknown_file"}.isdisjoint(files)

@@ -1,7 +1,7 @@
-"""Reasons for which pybullet's importer of MJCF makes another model of a file than MuJoCo does.
+"""Reasons why pybullet's importer of MJCF makes another model of a file than MuJoCo does.
 
-The importer knows few defaults, takes degrees for radians in files without <compiler>, and drops what it does not know.
-A file is read truly if all of its joints, shapes and bodies come out as the format says.
+The importer knows few defaults, takes degrees for radians in files without <compiler>, and drops unknown elements. A
+file is read correctly if all of its joints, shapes and bodies are as the format defines them.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from overlapper.simulation.bullet.attributes import numbers
 
 Attributes = Mapping[str, str]
 
-# Ways of MuJoCo to turn a body or a geom beside `quat`, which the importer passes over.
+# Attributes other than `quat` that rotate a body or a geom in MuJoCo. The importer ignores them.
 TURNS = ("euler", "axisangle", "xyaxes", "zaxis")
 SHAPES = ("plane", "sphere", "capsule", "cylinder", "box", "mesh")
-PLACED = ("size", "pos", "quat", "fromto", "mesh")  # attributes of a geom that the importer reads where they stand
+PLACED = ("size", "pos", "quat", "fromto", "mesh")  # attributes that are read from the geom alone
 DROPPED = ("frame", "include", "replicate", "composite", "flexcomp", "attach")  # elements with bodies or geoms in them
 
 TOLD = 3  # reasons in a sentence
 
 
 def misread(root: Element) -> str:
-    """The changes that the importer would make, for the end of a sentence; "" if there are none."""
+    """The changes that the importer would make, as the end of a sentence; "" if there are none."""
     reasons = list(dict.fromkeys(_Reader(root).reasons()))
     more = f"; and {len(reasons) - TOLD:,} more" if len(reasons) > TOLD else ""
     return "; ".join(reasons[:TOLD]) + more
@@ -33,7 +33,7 @@ def misread(root: Element) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Units:
-    """Whether angles are in degrees, and what limits a joint: by MuJoCo and by the importer."""
+    """Whether angles are in degrees, and when a joint is limited: in MuJoCo and in the importer."""
 
     degrees: bool
     degrees_here: bool
@@ -70,7 +70,7 @@ class _Reader:
             self._take_defaults(each, each.get("class", ""), own)
 
     def _effective(self, element: Element, of_body: str) -> Attributes:
-        """The attributes of a joint or geom as MuJoCo has them, defaults included."""
+        """The attributes of a joint or geom in MuJoCo, defaults included."""
         name = element.get("class", of_body)
         return {**self._defaults.get(name, {}).get(element.tag, {}), **element.attrib}
 
@@ -161,5 +161,5 @@ class _Reader:
 
 
 def _turn(attributes: Attributes) -> str:
-    """How a body or geom is turned that the importer does not turn."""
+    """The attribute that rotates a body or geom and that the importer ignores; "" if there is none."""
     return next((name for name in TURNS if name in attributes and any(numbers(attributes[name])[:3])), "")

@@ -1,4 +1,4 @@
-"""Files that pybullet loads, read in a process of its own, as pybullet dies of some."""
+"""Files for pybullet, read in a separate process, as some files crash pybullet."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from overlapper.install import simulator_hint
 from overlapper.jobs.confined import MEGABYTES, SECONDS, out_of_memory
 from overlapper.jobs.worker import Ended, Worker
 
-LOADED = "loaded"  # the first reply: what comes then may take long, as meshes are decomposed, with limits of its own
+LOADED = "loaded"  # the first reply. Decomposition of meshes follows, which may take long and has its own limits
 
 ENDINGS = (".urdf", ".sdf", ".xml", ".bullet")
 
@@ -27,10 +27,10 @@ def read_apart(
     request: tuple[Any, ...],
     endings: Sequence[str] = ENDINGS,
 ) -> Any:
-    """The last reply of `answers` to a request, in a process of its own; a text is the reason why there is none.
+    """The last reply of `answers` to a request, in a separate process. A reply that is a text is why reading failed.
 
-    `answers` says LOADED when pybullet has the file, which has limits of time and memory. NotRead if the file is not
-    there, or breaks a limit, or pybullet refuses it or dies of it; ImportError without pybullet.
+    `answers` yields LOADED when pybullet has loaded the file. Loading has limits of time and memory. NotRead if the
+    file is missing, breaks a limit, is refused by pybullet or crashes it. ImportError without pybullet.
     """
     if find_spec("pybullet") is None:
         raise ImportError(f"overlapper.simulation needs {simulator_hint()}")

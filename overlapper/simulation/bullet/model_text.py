@@ -1,6 +1,6 @@
-"""The text of a URDF, SDF or MJCF file: what it names, and what in it pybullet would take for something else.
+"""The text of a URDF, SDF or MJCF file: the files and shapes that it names, and what pybullet would misread.
 
-It is read in a process of its own, as pybullet's part is (`overlapper.simulation.bullet.model_file`).
+The text is read in a separate process, as pybullet reads the file there (`overlapper.simulation.bullet.model_file`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from overlapper.simulation.bullet.attributes import numbers
 from overlapper.simulation.bullet.mjcf import misread
 from overlapper.simulation.bullet.model_file import NotRead
 
-# Attributes of a URDF joint and of collision shapes that are numbers, by their elements.
+# Attributes of URDF joints and collision shapes that are numbers, by element.
 NUMBERS = {
     "origin": ("xyz", "rpy"),
     "axis": ("xyz",),
@@ -31,7 +31,7 @@ NUMBERS = {
 }
 BOUNDED = ("revolute", "prismatic")
 
-LINE = 8191  # bytes of a line that pybullet reads at once: it breaks a longer line there, be it in a number
+LINE = 8191  # bytes: pybullet breaks longer lines here, even within a number
 
 NO_NUMBER = re.compile(rb"^v[ \t][^\n]*\b(?:nan|inf)", re.IGNORECASE | re.MULTILINE)
 LIBRARY = re.compile(rb"^mtllib[ \t]+([^\r\n]+)", re.MULTILINE)
@@ -40,13 +40,13 @@ LIBRARY = re.compile(rb"^mtllib[ \t]+([^\r\n]+)", re.MULTILINE)
 def root_of(path: Path) -> Element:
     """The root of a model. NotRead if it has none.
 
-    Text behind the end of a URDF is not read, as pybullet does not read it.
+    Text after the end of a URDF is ignored, as pybullet ignores it.
     """
     text, end = path.read_bytes(), b"</robot>"
     urdf = path.suffix.lower() == ".urdf" and end in text
     try:
         return ElementTree.fromstring(text[: text.index(end) + len(end)] if urdf else text)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:  # which pybullet may have passed over
+    except (ElementTree.ParseError, ValueError, LookupError) as error:  # pybullet may accept it
         raise NotRead(f"it is no XML: {first_line(error)}") from error
 
 
@@ -60,10 +60,10 @@ def _must_not_be_broken(text: bytes) -> None:
 
 
 def must_be_sound(path: Path, root: Element) -> None:
-    """NotRead if pybullet would take a model for something else than it says, or if the model names a pipe for a mesh.
+    """NotRead if pybullet would make another model of the file, or if the model names a pipe as a mesh.
 
-    Lines of any may be broken, URDFs may have joints or shapes whose numbers are not finite, SDFs may include others,
-    and MJCF may have whatever the importer changes.
+    Lines of any file may be broken. A URDF may have joints or shapes with numbers that are not finite. An SDF may
+    include other files. An MJCF file may have elements that the importer changes.
     """
     _must_not_be_broken(path.read_bytes())
     for name in named_files(root):
@@ -94,7 +94,7 @@ def named_files(root: Element) -> Iterator[str]:
 
 
 def _must_be_a_file(model: Path, name: str) -> None:
-    """NotRead if what pybullet would open for a name is no file: a pipe may never end, of a folder pybullet dies."""
+    """NotRead if pybullet would open something other than a file: a pipe may never end, and a folder crashes it."""
     file = found(model, name)
     if file is None:
         return
@@ -111,7 +111,7 @@ def _must_be_a_file(model: Path, name: str) -> None:
 
 
 def found(model: Path, name: str) -> Path | None:
-    """The first place where pybullet looks for what a model names and finds anything."""
+    """The first existing path among the places where pybullet looks for a name in a model."""
     name = re.sub("^(package|model|file)://", "", name)
     try:
         return next(
@@ -122,7 +122,7 @@ def found(model: Path, name: str) -> Path | None:
 
 
 def _checked(joint: Element) -> set[str]:
-    """The elements of a joint whose numbers count."""
+    """The elements of a joint whose numbers are used."""
     tags = {"origin", "mimic"}
     if joint.get("type") != "fixed":
         tags.add("axis")
@@ -145,9 +145,9 @@ def _must_have_numbers(owner: str, element: Element, tags: set[str]) -> None:
 
 
 def named_shapes(path: Path, root: Element) -> dict[str, list[list[str]]]:
-    """By the name of a link, the collision shapes that a model names for it: by their meshes, or else their kinds.
+    """The collision shapes that a model names, by name of the link. A shape is given by its mesh, or else by its kind.
 
-    Links of equal names are in the order of the file. Bodies of MJCF without a name are called "".
+    Links with equal names are in the order of the file. MJCF bodies without a name are called "".
     """
     mjcf = path.suffix.lower() == ".xml"
     found: dict[str, list[list[str]]] = {}

@@ -1,4 +1,4 @@
-"""A recorder of what pybullet is told and cannot be asked for later."""
+"""A recorder of the settings that pybullet is told and cannot be asked for later."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FILE_NAMES = ("fileName", "sdfFileName", "mjcfFileName")
 
 
 class Loaded(NamedTuple):
-    """The file that bodies were loaded from; `place` is where it is, as far as that is known."""
+    """The file that bodies were loaded from. `place` is its path, None if unknown."""
 
     file: str
     place: Path | None
@@ -39,12 +39,12 @@ class Loaded(NamedTuple):
 
     @property
     def alone(self) -> bool:
-        """Whether one body was loaded from it."""
+        """Whether only one body was loaded from the file."""
         return len(self.bodies) == 1
 
 
 class Recorder:
-    """Notes what pybullet is told and cannot be asked for later.
+    """Notes the settings that pybullet is told and cannot be asked for later.
 
     These are pair filters, the filter mode, self-collision, the data of height fields, and the files of bodies.
 
@@ -53,9 +53,10 @@ class Recorder:
         ...  # build the scene
         bodies = Bodies(client, recorder=recorder)
 
-    Set it up before the scene is built, and before `from pybullet import ...` of the functions in question. Until
-    `close()`, or the end of a `with`, they are replaced in the module `pybullet`, for all clients. The others call them
-    and note what was asked of this client. What another process tells a shared simulation is not seen.
+    Set it up before the scene is built, and before any `from pybullet import ...` of the functions that it listens to.
+    Until `close()`, or the end of a `with`, these functions are replaced in the module `pybullet`, for all clients. The
+    replacements call the original functions and note the calls for this client. Calls of another process to a shared
+    simulation are not noticed.
     """
 
     def __init__(self, physicsClientId: int = 0) -> None:
@@ -65,7 +66,7 @@ class Recorder:
         self.masks_set = 0
         """How often groups and masks were set."""
         self.scenes_loaded = 0
-        """How often bodies may have come or gone without a word of pybullet: those of loadBullet."""
+        """How often bodies may have come or gone unreported by pybullet, as with loadBullet."""
         self.commands = Commands(physicsClientId)
         """The commands to motors, constraints and bodies."""
         self._forget()
@@ -75,21 +76,21 @@ class Recorder:
         self.pair_filters: dict[tuple[LinkKey, LinkKey], bool] = {}
         """Whether setCollisionFilterPair lets two links collide; the lesser link first."""
         self.both_masks_must_agree = False
-        """collisionFilterMode 0; by default one mask that admits the other's group is enough."""
+        """True for collisionFilterMode 0. By default one mask that admits the other's group is enough."""
         self.self_collision: dict[int, int] = {}
-        """The flags, by body, that a body with URDF_USE_SELF_COLLISION was loaded with."""
+        """The load flags of each body that was loaded with URDF_USE_SELF_COLLISION."""
         self.loaded: dict[int, Loaded] = {}
-        """Where bodies come from that loadURDF, loadSDF or loadMJCF made."""
+        """The files of the bodies that loadURDF, loadSDF or loadMJCF made."""
         self._search_path = ""
         self._fields: dict[int, HeightField] = {}  # by shape
         self._shapes: dict[int, int] = {}  # by body that is a height field
 
     def height_field(self, body: int) -> HeightField | None:
-        """The height field that a body is, if it was given as heightfieldData."""
+        """The height field of a body, if it was given as heightfieldData."""
         return self._fields.get(self._shapes.get(body, -1))
 
     def close(self) -> None:
-        """Note nothing any more; what was noted stays. pybullet is as before once all recorders are closed."""
+        """Stop noting and keep the notes. After all recorders are closed, pybullet has its own functions again."""
         unlisten(self._hear)
 
     def __enter__(self) -> Recorder:
@@ -147,7 +148,7 @@ class Recorder:
                 self._forget()
 
     def _found(self, file: str) -> Path | None:
-        """Where pybullet has found a file, by the folders that it looks in first."""
+        """The path at which pybullet has found a file, by the folders that it searches first."""
         places = (Path(folder, file) for folder in ("", self._search_path, pybullet_data.getDataPath()))
         return next((place.absolute() for place in places if place.is_file()), None)
 
@@ -170,9 +171,9 @@ class Recorder:
 def height_field(
     data: ArrayLike, rows: int, columns: int, scale: ArrayLike, before: HeightField | None = None
 ) -> HeightField:
-    """The field that createCollisionShape makes of these heights, `rows` of them along x.
+    """The field that createCollisionShape makes of these heights, with `rows` heights along x.
 
-    Bullet puts the middle height at z = 0. A field that takes the place of another one `before` keeps its middle.
+    Bullet puts the middle height at z = 0. A field that replaces the field `before` keeps the middle of that field.
     """
     x, y, z = np.asarray(scale, dtype=float)
     # Bullet keeps the heights in single precision.

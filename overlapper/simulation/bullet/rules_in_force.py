@@ -1,4 +1,4 @@
-"""Bullet's rules of who may collide, read again when they may have changed."""
+"""Bullet's rules of which links may collide, read again when they may have changed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from overlapper.simulation.model import LinkKey
 
 
 class RulesInForce:
-    """`rules` at this step, from groups and masks, and from what a recorder has heard.
+    """The `rules` at this step, from groups, masks and the notes of a recorder.
 
     Without a recorder there are no pair filters, one mask is enough, and no body collides with itself.
     """
@@ -27,13 +27,13 @@ class RulesInForce:
         self._layout: Layout | None = None
         self._bodies: list[int] = []
         self._static: list[bool] = []
-        self._noted = (0, 0)  # changes and masks set, as the recorder counts them
+        self._noted = (0, 0)  # the recorder's counts of changes and of masks set
         self.rules: Rules = MaskRules(Colliders.of({}, {}))
 
     def follow(self, known: KnownBodies, layout: Layout, fresh: bool) -> None:
-        """Take over what has changed since the last step. Filters that are `fresh` have just been read."""
-        # changeDynamics gives a base the group of static or of moving bodies as it becomes one.
-        poses = cast(ColliderPoses, layout.poses)  # which BulletSource has made
+        """Update the rules if anything has changed since the last step. `fresh` filters have just been read."""
+        # When a base becomes static or stops being static, changeDynamics changes its group.
+        poses = cast(ColliderPoses, layout.poses)  # BulletSource makes ColliderPoses
         bodies, static = poses.bodies, poses.static.copy()
         noted = (self._recorder.changes, self._recorder.masks_set) if self._recorder else (0, 0)
         if bodies == self._bodies:
@@ -65,7 +65,7 @@ class RulesInForce:
 def _within(
     body: int, flags: int, parents: Mapping[int, int], rows: Iterable[LinkKey]
 ) -> Iterator[tuple[LinkKey, LinkKey]]:
-    """The pairs of links of a body that its flags let collide, as btMultiBodyLinkCollider sees them."""
+    """The pairs of links of a body that may collide by its flags, as in btMultiBodyLinkCollider."""
     links = sorted(link for id, link in rows if id == body)
     apart_from: dict[int, set[int | None]]
     if flags & pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS:

@@ -1,4 +1,4 @@
-"""A pybullet client written to a temporary .bullet file, and which body of the file is which of the client."""
+"""A pybullet client written to a temporary .bullet file, and the bodies of the file matched to those of the client."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def body_type(client: int, id: int) -> int:
 
 
 def saved_bodies(client: int, ids: Sequence[int]) -> tuple[BulletFile, dict[int, int], list[int]]:
-    """The scene as a .bullet file, the place in the file of each of `ids` but the soft ones, and whose pose is hidden.
+    """The scene as a .bullet file, the place in it of each body in `ids` that is not soft, and the hidden bodies.
 
-    The file has no ids. Position and number of links identify a body unless another shares them or pybullet hides its
-    position, as it does of bodies of 128 links and more. In these cases each body has a friction of its own while the
-    file is written.
+    The file has no ids. Position and number of links identify a body, unless another body shares them or the body is
+    hidden: pybullet does not report the position of bodies with 128 links or more. In these cases each body gets a
+    distinct friction while the file is written.
     """
     ids = [id for id in ids if body_type(client, id) != SOFT_BODY]
     file = save(client)
@@ -58,9 +58,9 @@ def _base_position(client: int, id: int) -> tuple[float, ...]:
 
 
 def save(client: int) -> BulletFile:
-    """Unreadable if pybullet cannot write the file, or not whole, as on a disk that is full: it does not say so."""
+    """Write and read the file. Unreadable if it is missing or incomplete: pybullet does not report a full disk."""
     try:
-        # A file and no folder, whose removal takes as long as all the rest.
+        # A file without its own folder: removing a folder takes as long as all the rest.
         descriptor, name = tempfile.mkstemp(prefix="overlapper-", suffix=".bullet")
         os.close(descriptor)
     except OSError as error:

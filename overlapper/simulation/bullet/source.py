@@ -1,4 +1,4 @@
-"""A pybullet client that answers what `AnyBodies` asks."""
+"""The `Source` of a pybullet client."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class BulletSource(Source):
         self._in_force = RulesInForce(recorder)
         self._fresh = False  # whether filters have been read since the rules were asked for
         self._closed = False
-        self._told: dict[int, ModelledBody] = {}  # those that are known to collide with themselves
+        self._told: dict[int, ModelledBody] = {}  # bodies with a SelfCollisionWarning
 
     @property
     def time_step(self) -> float:
@@ -74,7 +74,7 @@ class BulletSource(Source):
         return self._in_force.rules
 
     def cautions(self, layout: Layout) -> Iterator[Warning]:
-        """One, once, for each body whose links pybullet keeps apart without a recorder that knows of it."""
+        """One warning for each body that collides with itself in pybullet, unless a recorder knows of it."""
         for id in layout.of_several_colliders:
             body = self.bodies[id]
             if (self._recorder and id in self._recorder.self_collision) or self._told.get(id) is body:

@@ -1,4 +1,4 @@
-"""Steps of a pybullet client in which other forces stand in for Bullet's response to contacts."""
+"""Steps of a pybullet client in which other forces replace Bullet's response to contacts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def time_step(client: int) -> float:
 
 
 _INSIDE: WeakValueDictionary[int, Stepping] = WeakValueDictionary()
-"""The one that has entered, by client."""
+"""The `Stepping` that has entered, by client."""
 
 
 class Stepping:
@@ -77,10 +77,10 @@ class Stepping:
 
 
 class Response:
-    """The pairs of links of a client that Bullet does not push apart any more.
+    """The pairs of links of a client to which Bullet's response is turned off.
 
-    A pair filter takes a pair from Bullet's collision detection, so that it costs nothing there and has no contact
-    points. No recorder hears of it: to `Bodies` the pair is as before.
+    A pair filter removes the pair from Bullet's collision detection, so the pair costs nothing there and has no contact
+    points. No recorder hears of the filter, so `Bodies` still looks at the pair.
     """
 
     def __init__(self, client: int) -> None:
@@ -88,13 +88,13 @@ class Response:
         self._off: set[tuple[LinkKey, LinkKey]] = set()
 
     def turn_off(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
-        """Turn the response to those pairs off, too."""
+        """Turn the response to these pairs off, too."""
         for pair in pairs:
             self._set(pair, 0)
             self._off.add(pair)
 
     def turn_on(self, recorder: Recorder | None) -> None:
-        """Turn the response on again, but to pairs that a script has filtered itself, as a recorder has heard."""
+        """Turn the response on again, except for pairs that a script has filtered, as far as a recorder has heard."""
         filters = recorder.pair_filters if recorder else {}
         for pair in sorted(self._off):
             if filters.get(pair, True):

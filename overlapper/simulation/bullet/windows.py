@@ -23,9 +23,9 @@ def open_no_window() -> None:
 
 
 def tell_of_windows(tell: Callable[[], object]) -> None:
-    """From now on, `tell` is called before pybullet is asked for a window that there is no screen for.
+    """From now on, `tell` is called before pybullet is asked for a window where there is no screen.
 
-    pybullet then ends the process, in C, where nothing is told any more.
+    pybullet then ends the process in C, and Python cannot report anything any more.
     """
     connect: Callable[..., int] = pybullet.connect
 

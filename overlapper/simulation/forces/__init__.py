@@ -1,1 +1,1 @@
-"""Forces from what bodies share: volumetric contact in place of the simulator's contact points."""
+"""Forces from common volumes: volumetric contact in place of the simulator's contact points."""

@@ -1,4 +1,4 @@
-"""The contacts that a step will bring, and the substeps that they need."""
+"""The contacts that a step will bring, and the number of substeps that they need."""
 
 from __future__ import annotations
 
@@ -24,12 +24,13 @@ BISECTIONS = 8
 def coming(
     masses: Masses, frames: Sequence[Pose], now: Overlaps, duration: float, velocity: Array, among: Among
 ) -> float:
-    """The square of the highest frequency (rad/s) of what bodies will share in a time as long as that (s).
+    """Return the square of the highest frequency (rad/s) of the overlaps that come within `duration` (s).
 
-    `frames` are those of the links, `now` is what the bodies share in them, and all coordinates go on with `velocity`.
+    `frames` are the frames of the links. `now` are the overlaps in these frames. All coordinates are assumed to keep
+    their `velocity`.
 
-    A body that came in by a long step would be deeper than its speed can take it: it would be thrown back. So steps
-    are short before they have to be: before two touch, and before an edge comes down to a face.
+    If a body came in with a long step, it would be deeper than its speed can carry it, and it would be thrown back.
+    Steps are therefore short before they have to be: before two bodies touch, and before an edge comes down to a face.
     """
     # Bodies at rest bring no new contact.
     if np.abs(velocity).max(initial=0.0) * duration < STILL:
@@ -58,12 +59,12 @@ def coming(
 
 
 def followed(frequency2: float, duration: float) -> int:
-    """How many substeps of a duration follow a swing of that frequency, squared."""
+    """Return how many substeps of a duration follow an oscillation, given the square of its frequency."""
     return max(1, math.ceil(math.sqrt(frequency2) * duration))
 
 
 def _swallowed(found: Overlaps) -> set[tuple[int, int]]:
-    """The pairs in which one lies wholly in the other: their overlap has no patch."""
+    """Return the pairs in which one body lies wholly in the other: their overlap has no patch."""
     area = found.gradient[:, 1, :3]
     rows = (found.volume > 0) & ((area * area).sum(axis=1) <= (NO_PATCH * found.area) ** 2)
     return {(a, b) for a, b in found.pairs[rows].tolist()} if rows.any() else set()

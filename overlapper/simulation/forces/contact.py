@@ -26,7 +26,7 @@ MOST_SUBSTEPS = 200
 
 
 class VolumetricContact:
-    """Contact of pybullet bodies by what they share, instead of Bullet's contact points.
+    """Contact forces from the volumes that pybullet bodies share, in place of Bullet's contact points.
 
         bodies = Bodies(physicsClientId)
         contact = VolumetricContact(bodies)
@@ -34,45 +34,48 @@ class VolumetricContact:
             while ...:
                 contact.step()  # instead of pybullet.stepSimulation()
 
-    Bodies are elastic foundations (Winkler): they press with `stiffness` (Pa/m) times the depth. A pair is pushed apart
-    by stiffness times the volume that it shares, through that volume's centroid, along the area vector of its patch. A
-    layer of thickness t and modulus E has the stiffness E / t; two bodies in series have 1 / (1 / k1 + 1 / k2). A body
-    rests as deep as its weight is stiffness times volume. What presses a body of several convex parts is the sum of
-    what presses these: as if they were one, but twice where the parts overlap each other.
+    Bodies are elastic foundations (Winkler): the pressure is `stiffness` (Pa/m) times the depth. The force between a
+    pair is stiffness times the common volume. It goes through the centroid of this volume, along the area vector of the
+    contact patch. A layer of thickness t and modulus E has the stiffness E / t. Two bodies in series have 1 / (1 / k1 +
+    1 / k2). A body rests at the depth where stiffness times volume is its weight. The force on a body of several convex
+    parts is the sum of the forces on its parts, as if the parts were one body. Where the parts overlap each other, the
+    force counts twice.
 
-    `dissipation` (s) is how far pressures are ahead of the depth, in time (Kelvin and Voigt). The damping ratio of a
-    swing of angular frequency w is w * dissipation / 2, and 0 keeps the energy. `friction` is Coulomb's coefficient, by
-    default that of pybullet: the product of the two links' lateralFriction. A patch resists slip and spin together, as
-    an ellipsoid of force and torque; what sticks does not creep. "distributed" resists at points spread over the patch
-    instead, by pybullet's coefficients, which is more exact where bodies slip and spin at once. Restitution, rolling
-    and spinning friction of pybullet are not used. Each may be a function of the pair of links, as stiffness=lambda a,
-    b: ..., of (body, link) twice, which is asked once for each pair.
+    `dissipation` (s) is the time by which pressures are ahead of the depth (Kelvin and Voigt). The damping ratio of an
+    oscillation of angular frequency w is w * dissipation / 2. A dissipation of 0 keeps the energy. `friction` is
+    Coulomb's coefficient. By default it is that of pybullet: the product of the two links' lateralFriction. A patch
+    resists slip and spin together: its force and torque stay within an ellipsoid. Sticking bodies do not creep. With
+    "distributed", friction acts at points spread over the patch, with pybullet's coefficients. This is more exact where
+    bodies slip and spin at once. Restitution, rolling and spinning friction of pybullet are not used. Each of the three
+    may be a function of the pair of links, as stiffness=lambda a, b: .... Its arguments are two (body, link). It is
+    called once for each pair.
 
-    A step of the simulator is taken in `substeps`, by default as many as the stiffness and the masses ask for, and
-    anew in every step. Too few of them are told with one SubstepsWarning for each pair; their contacts are then solved
-    by backward Euler, which loses energy.
+    A step of the simulator is divided into `substeps`. By default their number follows from the stiffness and the
+    masses, anew in every step. If there are too few substeps, one SubstepsWarning for each pair says so. The contacts
+    of such pairs are then solved by backward Euler, which loses energy.
 
-    `pairs` are those that `Bodies.pairs` takes, by default all that the simulator lets collide. Within the `with`,
-    Bullet does not respond to these, whether they touch or not, and getContactPoints has none of them; it simulates all
-    else: joints, motors, constraints and other pairs. A `Bodies` with a recorder knows which pairs a script has
-    filtered; without one they are pushed apart, too.
+    `pairs` are those that `Bodies.pairs` takes, by default all pairs that the simulator lets collide. Within the
+    `with`, Bullet does not respond to these pairs, whether they touch or not, and getContactPoints has none of them.
+    Bullet simulates everything else: joints, motors, constraints and other pairs. A `Bodies` with a recorder knows
+    which pairs a script has filtered. Without a recorder, filtered pairs are pushed apart, too.
 
-    What else acts on the bodies, as gravity, motors, constraints and forces of the script, is taken to be as it was in
-    the substep before. Commands of a script to motors and constraints within the `with`, and the forces that it
-    applies, are given again in each substep. So they last for the whole step, though pybullet keeps them as impulses.
-    Gains of motors are those of a whole step, too. Motors that were told before, unless a recorder has heard it, are as
-    much stronger as substeps are shorter.
+    All other forces on the bodies (gravity, motors, constraints, forces of the script) are assumed to be as in the
+    substep before. Within the `with`, the script's commands to motors and constraints and the forces that it applies
+    are given again in each substep. So they last for the whole step, though pybullet keeps them as impulses. Gains of
+    motors are those of a whole step, too. A motor that was commanded before the `with` is stronger by the number of
+    substeps, unless a recorder knows the command.
 
-    A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning; the others go on.
+    A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning. The other bodies go on.
 
-    A body that lies wholly within another, or goes through a plate, has no direction. It is pushed where it was pushed
-    last, or along the least translation that frees it, with one NoDirectionWarning for each pair.
+    If a body lies wholly within another, or goes through a plate, its force has no direction. The body is pushed in its
+    last direction, or along the shortest translation that separates it. One NoDirectionWarning for each pair says so.
 
-    After `step()` or `forces()` there is a row for each pair of shapes that overlaps, of the last substep, in SI units
-    and the world. The rows of `force`, `torque`, `centre`, `energy` and `slip` are parallel to `contacts`. `last` has
-    them all, and `mean()` the mean over the whole step.
+    After `step()` or `forces()` there is a row for each pair of shapes that overlaps in the last substep. Values are in
+    SI units and in world coordinates. The rows of `force`, `torque`, `centre`, `energy` and `slip` are parallel to
+    `contacts`. `last` has them all. `mean()` has the mean over the whole step.
 
-    ValueError says what is wrong with an argument, RuntimeError at the `with` that its client is within one already.
+    ValueError says which argument is wrong. RuntimeError is raised at the `with` if its client is within another one
+    already.
     """
 
     def __init__(
@@ -119,9 +122,9 @@ class VolumetricContact:
         self._mechanics.leave()
 
     def step(self) -> None:
-        """Let the simulation go on by one of its time steps.
+        """Advance the simulation by one of its time steps.
 
-        RuntimeError outside of the `with`, where Bullet would push the bodies apart as well.
+        RuntimeError outside of the `with`, because Bullet would push the bodies apart as well.
         """
         if not self._inside:
             raise RuntimeError("step() is for within `with contact:`, where Bullet does not respond to these pairs")
@@ -155,7 +158,10 @@ class VolumetricContact:
         self._mechanics.announce()
 
     def forces(self) -> Forces:
-        """The forces with which a step of the simulator would begin, without taking it: for scripts that integrate."""
+        """Return the forces at the beginning of a step, without taking the step.
+
+        It is meant for scripts that integrate by themselves.
+        """
         self._refresh()
         velocity, lost = self._velocity()
         frequency2 = self._place(lost)
@@ -165,10 +171,11 @@ class VolumetricContact:
         return self._found
 
     def mean(self) -> Forces:
-        """The overlaps now, with the mean of force and torque over the last step, which moved the bodies in it.
+        """Return the overlaps now, with the mean of force and torque over the last step.
 
-        Forces of single substeps go up and down about it, as motors do. `slip` is of the end of the step. What has
-        pressed and parted within the step is not among the rows; what has come at its very end has no force yet.
+        The mean is what moved the bodies in the step. Forces of single substeps oscillate about the mean, as motors do.
+        `slip` is that at the end of the step. A pair that separated within the step has no row. A pair that began to
+        overlap at the very end of the step has no force yet.
         """
         self._follow()
         contacts = self.bodies.overlaps(pairs=self._among)
@@ -176,12 +183,12 @@ class VolumetricContact:
 
     @property
     def last(self) -> Forces:
-        """All of the last substep or `forces()`, which no later step changes."""
+        """All results of the last substep or of `forces()`. Later steps do not change them."""
         return self._found
 
     @property
     def contacts(self) -> Contacts:
-        """The overlaps, a row for each pair of shapes."""
+        """The overlaps, with a row for each pair of shapes."""
         return self._found.contacts
 
     @property
@@ -191,33 +198,39 @@ class VolumetricContact:
 
     @property
     def force(self) -> Array:
-        """(p, 3) N, on the first of each pair; on the second the opposite."""
+        """(p, 3) the force in N on the first of each pair. The second gets the opposite force."""
         return self._found.force
 
     @property
     def torque(self) -> Array:
-        """(p, 3) N m, on the first about `centre`: of pressures that change, and of friction that resists a spin."""
+        """(p, 3) the torque in N m on the first of each pair, about `centre`.
+
+        It comes from pressures that change and from friction that resists spinning.
+        """
         return self._found.torque
 
     @property
     def centre(self) -> Array:
-        """(p, 3) m, the centroid of what is shared: what the force goes through."""
+        """(p, 3) the centroid of the common volume in m. The force goes through this point."""
         return self._found.centre
 
     @property
     def energy(self) -> Array:
-        """(p,) J, stored in the pressures; see `Forces.energy`."""
+        """(p,) the energy in J that the pressures store. See `Forces.energy`."""
         return self._found.energy
 
     @property
     def slip(self) -> Array:
-        """(p, 3) m/s, of the first over the second at `centre`, along the patch, at the end of the substep."""
+        """(p, 3) the velocity in m/s of the first over the second at `centre`, along the patch.
+
+        It is that at the end of the substep.
+        """
         return self._found.slip
 
     def on(self, body: int, link: int | None = None) -> tuple[Array, Array]:
-        """Force (3,) in N and torque (3,) in N m about the world's origin, by all pairs, on a body or a link of it.
+        """Return the force (3,) in N and the torque (3,) in N m on a body or on a link of it, from all pairs.
 
-        ValueError if there is no such body or link.
+        The torque is about the world's origin. ValueError if there is no such body or link.
         """
         return self._found.on(body, link)
 
@@ -231,7 +244,7 @@ class VolumetricContact:
         return f"VolumetricContact({len(self)} pairs of shapes press, {self.substeps} substeps)"
 
     def _refresh(self) -> None:
-        """See what has come or gone, and how heavy things are."""
+        """Read which bodies have come or gone, and the masses."""
         self.bodies.update()
         if self._masses.are_stale():
             self._model()
@@ -243,30 +256,33 @@ class VolumetricContact:
             self._mechanics.turn_off(self.bodies.link_pairs(self._among))
 
     def _follow(self) -> None:
-        """Where the bodies are within a step, or at its end."""
+        """Read where the bodies are within a step, or at its end."""
         self.bodies.follow()
         if self._masses.keys is not self.bodies.keys:
             self._model()
             self._parts = []
 
     def _model(self) -> None:
-        """Read the masses and joints of the bodies that there are."""
+        """Read the masses and joints of the bodies."""
         self._masses = Masses(self.bodies, self._mechanics, self._layers)
         self._others = OtherForces(self._masses.dynamics.gravity)
 
     @property
     def _planned(self) -> int:
-        """The substeps that were asked for; 0 if that is left to the stiffness."""
+        """The number of substeps that the caller asked for; 0 if it is chosen from the stiffness."""
         return 0 if self._substeps == "auto" else int(self._substeps)
 
     def _velocity(self) -> tuple[Array, set[int]]:
-        """The velocities of all coordinates; the bodies that have none that is finite, which are told."""
+        """Return the velocities of all coordinates and the bodies without a finite one, and warn of these."""
         velocity, lost = self._masses.velocity()
         self._told.of_velocity(lost)
         return velocity, lost
 
     def _place(self, lost: set[int]) -> Array:
-        """Give the solver what all but the `lost` bodies share where they are; the squares of frequencies by row."""
+        """Give the solver the overlaps of all but the `lost` bodies, at their poses now.
+
+        Returns the squares of the frequencies by row.
+        """
         self._contacts = self.bodies.overlaps(pairs=self._among)
         if lost:
             of_lost = np.isin(self._contacts.keys[:, [0, 3]], [*lost]).any(axis=1)
@@ -277,12 +293,12 @@ class VolumetricContact:
         return frequency2
 
     def _coming(self, duration: float, velocity: Array) -> float:
-        """The square of the highest frequency of what bodies will share in a time as long as that."""
+        """Return the square of the highest frequency of the overlaps that come within the duration."""
         ahead = self._others.ahead(velocity, duration)
         return coming(self._masses, self._frames, self._contacts.overlaps, duration, ahead, self._among)
 
     def _solve(self, duration: float, velocity: Array, frequency2: Array) -> Array:
-        """The forces of a step as long as that; (n, 6) force and torque on the links."""
+        """Return the forces of a step of this duration: (n, 6) force and torque on the links."""
         other = self._others.learnt(velocity)
         damped = frequency2 * duration**2 > COARSE**2
         if damped.any():

@@ -1,4 +1,4 @@
-"""The energy that pressures store in what bodies share."""
+"""The energy that pressures store in overlaps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
 def energies(found: Overlaps, normals: Array, stiffness: Array) -> Array:
     """(p,) J: the work of pressures while each pair is drawn apart along its normal (p, 3).
 
-    That is stiffness times the integral of the volume over the way. Where one of a pair is a half-space, it is
+    This work is stiffness times the integral of the volume over the way. If one of a pair is a half-space, the work is
     stiffness times volume times the depth of the centroid.
     """
     result = np.zeros(len(found))
@@ -33,7 +33,7 @@ def energies(found: Overlaps, normals: Array, stiffness: Array) -> Array:
 
 
 def _depth(plane: Placed, point: Array) -> float:
-    """How far a point is below the plane of a half-space, m."""
+    """Return how far a point is below the plane of a half-space, in m."""
     side = facts(plane.shape).side(point)
     assert side is not None
     normal, offset, _ = side
@@ -41,7 +41,10 @@ def _depth(plane: Placed, point: Array) -> float:
 
 
 def _work(a: Placed, b: Placed, normal: Array, way: float) -> float:
-    """The integral of the volume that the two share (m⁴) while the first is drawn away, over a way that parts them."""
+    """Return the integral of the common volume (m⁴) while the first shape is drawn away.
+
+    `way` is a length that separates the two.
+    """
     orientations = np.concatenate([np.repeat([a.orientation], len(NODES), axis=0), [b.orientation]])
     shapes, pairs = [a.shape] * len(NODES) + [b.shape], [(k, len(NODES)) for k in range(len(NODES))]
     while True:

@@ -21,16 +21,20 @@ NO_PATCH = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Forces(Tabular):
-    """Forces between overlapping pairs of shapes, a row for each pair, in SI units and the world frame.
+    """Forces between overlapping pairs of shapes, a row for each pair, in SI units and world coordinates.
 
-    `contacts` are their overlaps. `force` (p, 3) in N acts on the first of each pair at `centre`, and the opposite on
-    the second. So does `torque` (p, 3) in N m about it: of pressures that change, and of friction that resists a spin.
-    `slip` (p, 3) in m/s is the velocity of the first over the second at `centre`, along the patch, at the end of the
-    step. `normal` (p, 3) is the direction of the pressures, unit, from the second to the first. Where `directed` (p,)
-    is False, the overlap has no direction, and `normal` is the last known. `stiffness` (p,) is in Pa/m.
+    - `contacts`: the overlaps of the pairs.
+    - `force` (p, 3) in N: acts on the first of each pair at `centre`. The opposite force acts on the second.
+    - `torque` (p, 3) in N m: acts on the first about `centre`. The opposite torque acts on the second. It comes from
+      pressures that change and from friction that resists spinning.
+    - `slip` (p, 3) in m/s: the velocity of the first over the second at `centre`, along the patch, at the end of the
+      step.
+    - `normal` (p, 3): the direction of the pressures, a unit vector from the second to the first.
+    - `directed` (p,): False where the overlap has no direction. `normal` is then the last known one.
+    - `stiffness` (p,): in Pa/m.
 
-    As a table, by `to_pandas()` and its like, they have the columns of `contacts` and those that volumetric contact
-    adds to `overlapper run`.
+    As a table, by `to_pandas()` and its like, they have the columns of `contacts` and the columns that volumetric
+    contact adds to `overlapper run`.
     """
 
     contacts: Contacts
@@ -48,24 +52,28 @@ class Forces(Tabular):
 
     @property
     def centre(self) -> Array:
-        """(p, 3) m, the centroid of what is shared: what the force goes through; not a number of pairs that touch."""
+        """(p, 3) the centroid of the common volume in m.
+
+        The force goes through this point. For pairs that touch, it is not a number.
+        """
         centroid: Array = self.contacts.overlaps.centroid
         return centroid
 
     @cached_property
     def energy(self) -> Array:
-        """(p,) J, stored in the pressures: half of stiffness times the square of the depth, over the patch.
+        """(p,) the energy in J that the pressures store.
 
-        It is found when it is first asked for. With a half-space it follows from the depth of the centroid. Otherwise
-        it is the work of drawing the two apart along the normal, by 16 volumes for each pair.
+        It is half of stiffness times the square of the depth, integrated over the patch. It is computed when it is
+        first asked for. For a pair with a half-space, it follows from the depth of the centroid. Otherwise it is the
+        work of drawing the two apart along the normal, computed from 16 volumes for each pair.
         """
         return energies(self.contacts.overlaps, self.normal, self.stiffness)
 
     def on(self, body: int, link: int | None = None) -> tuple[Array, Array]:
-        """Force (3,) in N and torque (3,) in N m about the world's origin, by all pairs, on a body or a link of it.
+        """Return the force (3,) in N and the torque (3,) in N m on a body or on a link of it, from all pairs.
 
-        Forces between links of a body cancel, unless one link is asked for. ValueError if there is no such body or
-        link.
+        The torque is about the world's origin. Forces between links of one body cancel, unless one link is asked for.
+        ValueError if there is no such body or link.
         """
         known = self.contacts.names
         if not any(id == body for id, _ in known):
@@ -83,7 +91,7 @@ class Forces(Tabular):
         return force, moment
 
     def between_links(self) -> dict[tuple[int, int, int, int], Array]:
-        """The force (3,) in N on the first of two links, by (bodyA, linkA, bodyB, linkB)."""
+        """Return the force (3,) in N on the first of two links, by (bodyA, linkA, bodyB, linkB)."""
         found: dict[tuple[int, int, int, int], Array] = {}
         for (a, la, _, b, lb, _), force in zip(self.pairs.tolist(), self.force):
             found[a, la, b, lb] = found.get((a, la, b, lb), 0.0) + force
@@ -91,11 +99,11 @@ class Forces(Tabular):
 
     @cached_property
     def measures(self) -> Array:
-        """(p, 10) force, torque, energy and slip, by the columns of `overlapper run`."""
+        """(p, 10) force, torque, energy and slip, in the order of the columns of `overlapper run`."""
         return np.column_stack([getattr(self, name) for name in FORCE_MEASURES])
 
     def columns(self) -> Columns:
-        """The columns of the table by name, each an array or a list with a value for each row."""
+        """Return the columns of the table by name, each an array or a list with a value for each row."""
         return {**self.contacts.columns(), **dict(zip(FORCE_COLUMNS, self.measures.T))}
 
     def __len__(self) -> int:
@@ -106,9 +114,10 @@ class Forces(Tabular):
 
 
 def mean(contacts: Contacts, parts: Sequence[tuple[float, Forces]], stiffness: Array) -> Forces:
-    """The forces on what bodies share now: their mean over the `parts` of a step, each a fraction of it and its forces.
+    """Return the mean forces of a step for the overlaps now.
 
-    `slip` is of the last part. `stiffness` (p,) in Pa/m is that of the contacts.
+    `parts` are the parts of the step: each has its fraction of the step and its forces. `slip` is that of the last
+    part. `stiffness` (p,) in Pa/m is that of the contacts.
     """
     found = contacts.overlaps
     count = 1 + max(int(each.pairs.max(initial=0)) for each in (found, *(part.contacts.overlaps for _, part in parts)))
@@ -133,6 +142,6 @@ def mean(contacts: Contacts, parts: Sequence[tuple[float, Forces]], stiffness: A
 
 
 def _codes(found: Overlaps, count: int) -> NDArray[np.int64]:
-    """The pairs of rows among so many shapes, as one number each."""
+    """Return the pair of each row as one number; `count` is larger than all indices of shapes."""
     first, second = found.pairs.T.astype(np.int64)
     return np.asarray(first * count + second)

@@ -1,4 +1,4 @@
-"""Bodies as masses and joints, with the shapes that press."""
+"""Bodies as masses and joints, with their shapes that press."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ from overlapper.simulation.model import Array
 
 
 class Masses:
-    """The masses and joints of the bodies that there are; stale once bodies have come or gone, or were put back."""
+    """The masses and joints of the bodies that exist.
+
+    They are stale if bodies have come or gone since, or if the state of the simulation was restored.
+    """
 
     def __init__(self, bodies: AnyBodies, mechanics: Mechanics, layers: Layers) -> None:
         self._bodies, self._mechanics, self._layers = bodies, mechanics, layers
@@ -30,11 +33,11 @@ class Masses:
         return self.keys is not self._bodies.keys or self._restored != self._mechanics.restored
 
     def stiffness(self, found: Overlaps) -> Array:
-        """(p,) Pa/m by row."""
+        """(p,) the stiffness of each row in Pa/m."""
         return self._layers.of(self._links[found.pairs], self.dynamics)[0]
 
     def place(self, solver: ContactSolver, frames: Sequence[Pose], found: Overlaps) -> tuple[Array, Array]:
-        """Give a solver what bodies share where their links have these frames.
+        """Give a solver the overlaps of links that have these frames.
 
         Returns by row the squares of frequencies (rad²/s²) and the stiffness (Pa/m).
         """
@@ -42,7 +45,10 @@ class Masses:
         return solver.place(frames, found, self._links, *layers), layers[0]
 
     def velocity(self) -> tuple[Array, set[int]]:
-        """The velocities of all coordinates, 0 where they are not finite; the bodies that such velocities move."""
+        """Return the velocities of all coordinates and the bodies that are lost.
+
+        Velocities that are not finite are 0. The lost bodies are those that such velocities move.
+        """
         velocity = self.dynamics.velocity()
         finite = np.abs(velocity) < FARTHEST
         if finite.all():
@@ -56,7 +62,7 @@ class Masses:
         return np.where(finite, velocity, 0.0), lost
 
     def ahead(self, duration: float, velocity: Array, among: Among) -> Overlaps:
-        """The overlaps after a duration (s) in which all coordinates go on with that velocity."""
+        """Return the overlaps after a duration (s) in which all coordinates keep this velocity."""
         bodies = self._bodies
         positions, orientations = self.dynamics.solver.ahead(
             duration, velocity, self._links, bodies.positions, bodies.orientations

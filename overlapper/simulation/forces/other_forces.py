@@ -1,4 +1,4 @@
-"""The forces on bodies that are not of contacts, told by how velocities change."""
+"""The forces on bodies that do not come from contacts, found from the change of velocities."""
 
 from __future__ import annotations
 
@@ -8,23 +8,26 @@ from overlapper.simulation.model import Array
 
 
 class OtherForces:
-    """The acceleration of all coordinates by gravity, motors, constraints and whatever else acts, as it was last."""
+    """The last acceleration of all coordinates by everything except contacts.
+
+    This includes gravity, motors, constraints and whatever else acts.
+    """
 
     def __init__(self, gravity: Array) -> None:
-        """`gravity` is the acceleration that is known before anything has moved."""
+        """Begin with `gravity`, the acceleration that is known before anything has moved."""
         self._acceleration = gravity
         self._before: tuple[Array, float, Array] | None = None  # velocity, duration and our part of the acceleration
         self._left: Array | None = None  # the velocity that the last step left
 
     def ahead(self, velocity: Array, duration: float) -> Array:
-        """The velocity after a duration (s), if it goes on to change as it did."""
+        """Return the velocity after a duration (s), if it keeps changing as it did."""
         if self._before:
             before, length, _ = self._before
             return velocity + duration / length * (velocity - before)
         return velocity + duration * self._acceleration
 
     def learnt(self, velocity: Array) -> Array:
-        """The acceleration by what else acts, now that the coordinates have this velocity."""
+        """Return the acceleration by everything except contacts, now that the coordinates have this velocity."""
         # It is told by how velocities have changed, unless somebody has set them since.
         if self._before and (self._left is None or np.array_equal(self._left, velocity)):
             before, length, ours = self._before
@@ -34,9 +37,9 @@ class OtherForces:
         return self._acceleration
 
     def solved(self, velocity: Array, duration: float, ours: Array) -> None:
-        """From that velocity on, contacts accelerate the coordinates by `ours`, for a duration (s)."""
+        """Record that from this velocity on, contacts accelerate the coordinates by `ours` for a duration (s)."""
         self._before, self._left = (velocity, duration, ours), None
 
     def left_at(self, velocity: Array) -> None:
-        """A step has ended with that velocity."""
+        """Record that a step has ended with this velocity."""
         self._left = velocity

@@ -19,7 +19,7 @@ OfPair = Callable[[LinkKey, LinkKey], float]
 class Layers:
     """The elastic layers of the bodies: stiffness, dissipation and friction, as `VolumetricContact` takes them.
 
-    With `distributed` friction the coefficients are those of the links.
+    With `distributed` friction, the coefficients are those of the links.
     """
 
     def __init__(
@@ -36,14 +36,17 @@ class Layers:
             self._friction = Parameter("friction", friction, "")  # type: ignore[arg-type]  # no other text is a number
 
     def of(self, pairs: NDArray[np.int64], dynamics: Dynamics) -> tuple[Array, Array, Array]:
-        """Stiffness, dissipation and coefficient of friction (p,) of pairs (p, 2) of places in `dynamics.links`."""
+        """Return stiffness, dissipation and coefficient of friction, each (p,).
+
+        `pairs` (p, 2) are pairs of indices in `dynamics.links`.
+        """
         links = dynamics.links
         friction = self._friction.of(pairs, links) if self._friction else dynamics.friction[pairs].prod(axis=1)
         return self._stiffness.of(pairs, links), self._dissipation.of(pairs, links), friction
 
 
 class Parameter:
-    """A number, or one for each pair of links."""
+    """A number for all pairs of links, or one number for each pair."""
 
     def __init__(self, name: str, given: float | OfPair, unit: str, positive: bool = False) -> None:
         self._name, self._unit, self._positive = name, f" {unit}" if unit else "", positive
@@ -53,7 +56,7 @@ class Parameter:
         self._links: Sequence[LinkKey] = ()
 
     def of(self, pairs: NDArray[np.int64], links: Sequence[LinkKey]) -> Array:
-        """(p,) of pairs (p, 2) of places in `links`."""
+        """Return (p,) the values for `pairs` (p, 2), which are pairs of indices in `links`."""
         if self._function is None:
             return np.full(len(pairs), self._number)
         if links is not self._links:

@@ -1,4 +1,4 @@
-"""The warnings of volumetric contact, each told once for a pair of links."""
+"""The warnings of volumetric contact, each given once for a pair of links."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from overlapper.simulation.model import Array, LinkKey
 
 
 class Told:
-    """The pairs of links and the bodies that users were warned of.
+    """The pairs of links and the bodies that users were already warned of.
 
     Warnings name the line that calls the caller's caller.
     """
@@ -29,7 +29,7 @@ class Told:
     def of_substeps(
         self, contacts: Contacts, damped: NDArray[np.bool_], frequency2: Array, duration: float, substeps: int
     ) -> None:
-        """Warn of the rows that are `damped`, as `substeps` of that duration (s) are too long for their frequencies."""
+        """Warn of the `damped` rows: `substeps` of this `duration` (s) are too few for their frequencies."""
         for row, a, b in self._new(SubstepsWarning, contacts, damped):
             frequency = math.sqrt(frequency2[row])
             needed = math.ceil(frequency * duration * max(1, substeps))
@@ -51,7 +51,7 @@ class Told:
             )
 
     def of_velocity(self, lost: Iterable[int]) -> None:
-        """Warn of the bodies that have no finite velocity."""
+        """Warn of the `lost` bodies, which have no finite velocity."""
         for body in sorted(set(lost) - self._lost):
             self._lost.add(body)
             link, name = next((link, name) for (id, link), name in sorted(self._bodies.names.items()) if id == body)
@@ -63,7 +63,7 @@ class Told:
             )
 
     def _new(self, kind: type[Warning], contacts: Contacts, rows: NDArray[np.bool_]) -> Iterator[tuple[int, str, str]]:
-        """The rows whose pairs were not warned of yet, and the names of their links."""
+        """Yield the rows whose pairs were not warned of yet, with the names of their links."""
         names = self._bodies.names
         for row in np.flatnonzero(rows).tolist():
             a, la, _, b, lb, _ = contacts.keys[row].tolist()

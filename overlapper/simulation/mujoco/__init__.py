@@ -1,4 +1,4 @@
-"""MuJoCo's own half: mujoco is asked here and nowhere else."""
+"""The part for MuJoCo. Only this package asks mujoco."""
 
 from overlapper.install import hint
 

@@ -24,22 +24,23 @@ class Bodies(AnyBodies):
             for contact in bodies.overlaps():
                 ...
 
-    Planes (infinite, as MuJoCo collides them), spheres, capsules, ellipsoids, cylinders, boxes and meshes are modelled;
-    a mesh is the convex hull that MuJoCo collides. Height fields, SDF plugins and flexes are in `skipped`, with one
-    SkippedShapeWarning each. Surfaces are nominal: MuJoCo's `contact.dist` is the distance of nominal surfaces, too.
+    Planes, spheres, capsules, ellipsoids, cylinders, boxes and meshes are modelled. A plane is infinite, as in MuJoCo's
+    collisions. A mesh is the convex hull that MuJoCo collides. Height fields, SDF plugins and flexes are in `skipped`,
+    with one SkippedShapeWarning each. Surfaces are nominal. MuJoCo's `contact.dist` is a distance of nominal surfaces,
+    too.
 
-    Keys are (body, geom, 0) in MuJoCo's numbers, names are MuJoCo's: "torso" is a body, "torso/foot1" a geom.
+    Keys are (body, geom, 0) in MuJoCo's numbers. Names are MuJoCo's: "torso" is a body, "torso/foot1" is a geom.
 
-    `update()` reads the poses of `data`. After mj_step these are the poses before its integration, as `data.contact`
-    has them; mj_kinematics brings them up to date. Sizes, types and meshes of geoms that are edited are noticed.
+    `update()` reads the poses of `data`. After mj_step these are the poses before its integration, as in
+    `data.contact`. mj_kinematics brings them up to date. Edited sizes, types and meshes of geoms are noticed.
 
     Pairs are those that mj_collision looks at, by masks, welds, parents, excludes, explicit pairs and flags at the last
     update. `pairs` and `overlaps` take other choices.
 
-    `data` is of this `model`, with poses: after mj_forward, mj_step or mj_kinematics. `names` are names of bodies by
-    MuJoCo's number, in place of those of the model. `surface`, `concave` and `concave_threshold` are as for pybullet's
-    Bodies, so that one loop serves both. The first must be "nominal", and the others change nothing: MuJoCo collides
-    hulls.
+    `data` must belong to this `model` and have poses: after mj_forward, mj_step or mj_kinematics. `names` are names of
+    bodies by MuJoCo's numbers, and replace those of the model. `surface`, `concave` and `concave_threshold` are
+    accepted as in pybullet's Bodies, so that the same loop works with both. `surface` must be "nominal". The other two
+    have no effect, as MuJoCo collides hulls.
 
     TypeError if `model` or `data` is of another class. ValueError if `data` is of another model or has no poses yet, or
     if a name or the surface is invalid.
@@ -62,7 +63,7 @@ class Bodies(AnyBodies):
             raise ValueError("data is of another model: make it with mujoco.MjData(model)")
         if surface != "nominal":
             raise ValueError(f"surface must be 'nominal', not {surface!r}: MuJoCo collides no others")
-        Modelling(concave, concave_threshold, surface)  # which refuses what is invalid
+        Modelling(concave, concave_threshold, surface)  # raises for invalid values
         self.model, self.data = model, data
         given = named(names)
         super().__init__(MujocoSource(model, data, given))

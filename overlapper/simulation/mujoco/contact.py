@@ -30,5 +30,5 @@ class GeomContact(Contact):
 
     @property
     def solids(self) -> tuple[int, int, int, int]:
-        """A body is rigid with all of its geoms, so these are the bodies as wholes."""
+        """(bodyA, -1, bodyB, -1): a body is rigid with all of its geoms."""
         return self.bodyA, BASE, self.bodyB, BASE

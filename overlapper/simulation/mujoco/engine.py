@@ -22,11 +22,11 @@ STEPS = ("mj_step", "mj_step2")
 _originals: dict[str, Callable[..., Any]] = {}
 _listeners: list[Listener] = []
 _begun: WeakSet[mujoco.MjData] = WeakSet()
-_steps_of_call = 1  # of the call that listeners are hearing of
+_steps_of_call = 1  # steps made by the call that is being reported to listeners
 
 
 class Simulated:
-    """See `Simulation`: a model and its data, which a scene returns or somebody else steps."""
+    """See `Simulation`: a model and its data, returned by a scene or stepped by other code."""
 
     def __init__(self, data: mujoco.MjData | None = None) -> None:
         self._data = data
@@ -62,7 +62,7 @@ class Simulated:
 
 
 def _parts(built: Any) -> tuple[Any, ...]:
-    """The model, the data and perhaps a function, of what `build` returned."""
+    """The model, the data and perhaps a function that `build` has returned."""
     parts = built if isinstance(built, tuple) else (built,)
     if len(parts) == 1 and isinstance(parts[0], mujoco.MjModel):
         parts = parts[0], mujoco.MjData(parts[0])
@@ -83,15 +83,15 @@ def running(which: mujoco.MjData, recorder: Any = None) -> Simulated:
 
 
 def build_of(path: Path) -> tuple[Callable[[], Any], float]:
-    """A `build` that compiles an MJCF file, and the time step of its model. ValueError if it does not compile."""
+    """A `build` that compiles an MJCF file, and the model's time step. ValueError if the file does not compile."""
     model = mujoco.MjModel.from_xml_path(str(path))
     return lambda: mujoco.MjModel.from_xml_path(str(path)), float(model.opt.timestep)
 
 
 def listen(listener: Listener) -> Callable[[], None]:
-    """Steps are noticed of `mujoco.mj_step` and `mujoco.mj_step2`, not of a name imported from mujoco before.
+    """Notice calls of `mujoco.mj_step` and `mujoco.mj_step2`, but not of names imported from mujoco earlier.
 
-    The simulation that a listener is told of is its MjData. It begins with the first step that anybody hears of.
+    Listeners get the MjData of the simulation. A simulation begins with its first step that is noticed.
     """
     if not _listeners:
         for name in STEPS:
@@ -111,7 +111,7 @@ def listen(listener: Listener) -> Callable[[], None]:
 
 
 def _heard(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function, with listeners told of each call."""
+    """The function, with each call reported to listeners."""
 
     @functools.wraps(function)
     def step(m: mujoco.MjModel, d: mujoco.MjData, *args: Any, **kwargs: Any) -> None:

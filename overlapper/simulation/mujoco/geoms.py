@@ -21,7 +21,7 @@ TYPES = {
     for name in dir(mujoco.mjtGeom)
     if name.startswith("mjGEOM_")
 }
-"""The names of the types of geoms, as MJCF has them, by number."""
+"""The MJCF names of the types of geoms, by number."""
 
 NOT_MODELLED = {
     "hfield": "height fields are not modelled",
@@ -31,21 +31,21 @@ ORIGIN, UNTURNED = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def collidable(model: Any) -> Numbers:
-    """The geoms that may be in a contact: those with a mask, and those of explicit pairs."""
+    """The geoms that may be in a contact: geoms with a mask, and geoms of explicit pairs."""
     on = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     on[model.pair_geom1] = on[model.pair_geom2] = True
     return np.flatnonzero(on)
 
 
 def drawn_from(model: Any) -> bytes:
-    """All numbers of the model that shapes are made of; they may be edited at any time."""
+    """All numbers of the model that define shapes. They may be edited at any time."""
     return b"".join(each.tobytes() for each in (model.geom_size, model.geom_type, model.geom_dataid))
 
 
 def modelled_bodies(model: Any, geoms: Numbers, names: dict[int, str]) -> dict[int, ModelledBody]:
-    """The bodies of these geoms by number, each geom with one shape or a reason why it has none.
+    """The bodies of these geoms by number. Each geom has one shape or a reason why it has none.
 
-    `names` are given for bodies by number; the others have MuJoCo's.
+    `names` are given names of bodies by number. The other bodies have MuJoCo's names.
     """
     owner = model.geom_bodyid
     return {
@@ -69,14 +69,14 @@ def _modelled_body(model: Any, body: int, geoms: Iterable[int], given: str | Non
 
 
 def color_of(model: Any, geom: int) -> Color:
-    """Its material's colour, else its own."""
+    """The colour of the geom's material, or else its own colour."""
     material = int(model.geom_matid[geom])
     red, green, blue, alpha = (model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]).tolist()
     return red, green, blue, alpha
 
 
 def shape_of(model: Any, geom: int) -> Shape:
-    """The shape that MuJoCo collides, in the geom's own frame. ValueError says why there is none."""
+    """The shape that MuJoCo collides, in the geom's own frame. ValueError gives the reason if there is none."""
     kind = TYPES.get(int(model.geom_type[geom]), "unknown")
     size = model.geom_size[geom].astype(float)
     match kind:
@@ -101,8 +101,8 @@ def shape_of(model: Any, geom: int) -> Shape:
 def hull_points(model: Any, mesh: int) -> NDArray[np.float64]:
     """(n, 3) the vertices of the hull that MuJoCo collides.
 
-    `mesh_graph` has the numbers of its vertices. `maxhullvert` makes it coarser than the hull of the mesh. Meshes that
-    nothing collided with when the model was compiled have no graph, and collide as the hull of all vertices.
+    `mesh_graph` has the numbers of its vertices. `maxhullvert` may make it coarser than the hull of the mesh. A mesh
+    that could not collide when the model was compiled has no graph. It collides as the hull of all its vertices.
     """
     first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
     vertices = np.asarray(model.mesh_vert[first : first + count], dtype=np.float64)
@@ -110,7 +110,7 @@ def hull_points(model: Any, mesh: int) -> NDArray[np.float64]:
     if graph < 0:
         return vertices
     of_hull = int(model.mesh_graph[graph])
-    begin = graph + 2 + of_hull  # behind both counts and the addresses of edges
+    begin = graph + 2 + of_hull  # after both counts and the addresses of edges
     return np.asarray(vertices[model.mesh_graph[begin : begin + of_hull]])
 
 
@@ -121,5 +121,5 @@ def _plane() -> HalfSpace:
 
 @lru_cache(maxsize=1024)
 def _hull(points: bytes) -> Hull:
-    """The hull of these points; that of geoms with the same mesh is one object."""
+    """The hull of these points. Geoms with the same mesh share one object."""
     return Hull(np.frombuffer(points).reshape(-1, 3))

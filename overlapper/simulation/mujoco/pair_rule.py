@@ -1,4 +1,4 @@
-"""MuJoCo's rule of which geoms may collide, evaluated for any pairs of geoms."""
+"""MuJoCo's rule of which geoms may collide, for any pairs of geoms."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ROWS = 1 << 20  # pairs counted at a time
 
 
 def in_force(model: Any) -> bytes:
-    """All numbers of the model that the rule depends on; they may be edited at any time."""
+    """All numbers of the model that the rule depends on. They may be edited at any time."""
     arrays = (
         model.geom_contype,
         model.geom_conaffinity,
@@ -30,10 +30,10 @@ def in_force(model: Any) -> bytes:
 
 
 class PairRule:
-    """Which of these geoms may collide with which, by place in `geoms`.
+    """Which pairs of these geoms may collide, by index into `geoms`.
 
-    A pair may collide if a mask of either admits the other, if they are not welded together or both fixed, if neither
-    is the other's parent, and if their bodies are not excluded. An explicit pair may collide whatever else is said.
+    A pair may collide if the mask of one geom admits the other, if they are not welded together or both fixed, if
+    neither is the other's parent, and if their bodies are not excluded. An explicit pair may collide in any case.
     Nothing collides while contacts or constraints are disabled. See mj_collision in engine_collision_driver.c.
     """
 
@@ -55,13 +55,13 @@ class PairRule:
         self._explicit = np.unique(self._code(np.minimum(first, second)[known], np.maximum(first, second)[known]))
 
     def allow(self, first: Indices, second: Indices) -> Mask:
-        """Whether the geoms at these places may collide, pair by pair."""
+        """Whether the geoms at these indices may collide, pair by pair."""
         if self._none:
             return np.zeros(len(first), dtype=bool)
         group, mask, weld, parent = self._group, self._mask, self._weld, self._parent
         allowed = ((group[first] & mask[second]) | (group[second] & mask[first])) != 0
         allowed &= (weld[first] != weld[second]) & ~(self._fixed[first] & self._fixed[second])
-        if self._by_parent:  # the world is nobody's parent
+        if self._by_parent:  # MuJoCo does not count the world as a parent
             related = (weld[first] == parent[second]) | (weld[second] == parent[first])
             allowed &= ~(related & (weld[first] != 0) & (weld[second] != 0))
         if len(self._excluded):

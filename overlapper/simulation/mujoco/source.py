@@ -1,4 +1,4 @@
-"""A MuJoCo model with its data that answers what `AnyBodies` asks."""
+"""The `Source` of a MuJoCo model with its data."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from overlapper.simulation.source import Source
 
 
 class GeomPoses:
-    """Where some geoms of `data` are. MuJoCo has quaternions as wxyz."""
+    """The poses of some geoms of `data`. MuJoCo's quaternions are wxyz."""
 
     def __init__(self, data: Any, colliders: Sequence[LinkKey]) -> None:
         self.colliders = colliders
@@ -37,7 +37,7 @@ class MujocoSource(Source):
     def __init__(self, model: Any, data: Any, given_names: Mapping[int, str]) -> None:
         self._model, self._data, self._given_names = model, data, dict(given_names)
         self.bodies: dict[int, ModelledBody] = {}
-        self._read: tuple[bytes, bytes] | None = None  # the numbers that the bodies were read from
+        self._read: tuple[bytes, bytes] | None = None  # the numbers of the model from which the bodies were read
         self._rule: tuple[bytes, Layout, PairRule] | None = None
         self._flexes_told = self._filter_told = False
 
@@ -71,7 +71,7 @@ class MujocoSource(Source):
 
     @property
     def skipped(self) -> list[Skipped]:
-        """The flexes: they are not rigid."""
+        """The flexes, which are not rigid."""
         kind = mujoco.mjtObj.mjOBJ_FLEX
         names = (mujoco.mj_id2name(self._model, kind, k) or f"flex {k}" for k in range(self._model.nflex))
         return [Skipped(-1, -1, name, "flexes are deformable, and not modelled") for name in names]
@@ -81,7 +81,7 @@ class MujocoSource(Source):
         return int(self._model.nflex)
 
     def cautions(self, layout: Layout) -> Iterator[Warning]:
-        """One, once, if a contact filter decides which pairs collide: Python cannot ask it."""
+        """One warning if a contact filter decides which pairs collide, as Python cannot ask the filter."""
         if not self._filter_told and mujoco.get_mjcb_contactfilter() is not None:
             self._filter_told = True
             yield UserWarning(

@@ -29,7 +29,7 @@ UNTURNED = np.array([0.0, 0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Mechanism:
-    """A model: its name, its links and shapes, the joints that follow others by name, and what is not read of it."""
+    """A model: its `name`, its `tree` of links, joints that follow others by name, and `notes` on unread parts."""
 
     name: str
     tree: KinematicTree
@@ -38,15 +38,15 @@ class Mechanism:
 
 
 def read_mechanism(path: Path) -> Mechanism:
-    """The mechanism of an MJCF file. ValueError with MuJoCo's words if it does not compile."""
+    """The mechanism of an MJCF file. ValueError with MuJoCo's message if the file does not compile."""
     return mechanism(mujoco.MjModel.from_xml_path(str(path)), path.stem)
 
 
 def mechanism(model: Any, name: str) -> Mechanism:
     """The mechanism of a model.
 
-    Each body is a link. A body with several joints has a link without shapes for each joint but the last. Bodies that
-    a free joint leaves to themselves are roots at their initial pose. The world is a root if it has geoms.
+    Each body is a link. A body with several joints has a link without shapes for each joint but the last. Bodies with
+    a free joint are roots at their initial pose. The world is a root if it has geoms.
     """
     made = _Links(model)
     geoms = collidable(model)
@@ -72,10 +72,10 @@ class _Links:
     links: list[TreeLink] = field(default_factory=list)
     shapes: list[LinkShape] = field(default_factory=list)
     roots: list[int] = field(default_factory=list)  # the bodies from which the trees hang
-    _last: dict[int, int] = field(default_factory=dict)  # by body: the place of its link
+    _last: dict[int, int] = field(default_factory=dict)  # by body: the index of its link
 
     def add(self, body: int, skipped: str) -> int:
-        """Add the links of a body, and return the place of the one that has its shapes."""
+        """Add the links of a body. Returns the index of the link that has the shapes."""
         model = self.model
         first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
         joints = [j for j in range(first, first + count) if model.jnt_type[j] != FREE]
@@ -99,7 +99,7 @@ class _Links:
 
 
 def _joint(model: Any, joint: int, position: Array, orientation: Array) -> Joint:
-    """A joint of a body whose frame is at this pose, in that of its parent, when the joint is at its reference."""
+    """A joint of a body. The pose is that of the body in its parent when the joint is at its reference."""
     kind = KINDS[int(model.jnt_type[joint])]
     anchor, axis = model.jnt_pos[joint].copy(), model.jnt_axis[joint].copy()
     reference = float(model.qpos0[model.jnt_qposadr[joint]])
@@ -114,7 +114,7 @@ def _joint(model: Any, joint: int, position: Array, orientation: Array) -> Joint
 
 
 def _equalities(model: Any) -> tuple[dict[str, Mimic], tuple[str, ...]]:
-    """The joints that an equality ties to another one, and sentences on what ties more than that."""
+    """The joints that an equality ties to another joint, and sentences on other equalities and on limits."""
     mimics: dict[str, Mimic] = {}
     notes: list[str] = []
     for k in range(model.neq):
@@ -130,7 +130,7 @@ def _equalities(model: Any) -> tuple[dict[str, Mimic], tuple[str, ...]]:
 
 
 def _mimic(model: Any, equality: int) -> tuple[str, Mimic] | None:
-    """The joint that an equality moves in proportion to another one; None if it is another kind of equality."""
+    """The joint that an equality ties linearly to another joint; None for any other equality."""
     follower, leader = int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])
     constant, slope, *rest = model.eq_data[equality][:5].tolist()
     if model.eq_type[equality] != mujoco.mjtEq.mjEQ_JOINT or leader < 0 or any(rest):

@@ -488,9 +488,7 @@ class Overlap:
 
     @property
     def tolerance(self) -> float:
-        """
-        The fraction of its volume by which the polytope of smooth shapes may be off.
-        """
+        """Allowed relative error of the volume for curved shapes."""
 
     @property
     def converged(self) -> bool:
@@ -703,34 +701,35 @@ def overlap(*shapes: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | Roun
     """
     The common set of two or more convex shapes.
 
-    Each is a Placed, a bare shape, or an (n, 3) array of points, which stands for their hull. `tolerance`, between 0 and 1,
-    is the fraction of the volume by which the polytope of smooth shapes may be off, which `converged` says whether it keeps;
-    polyhedra are exact whatever it is.
-    No overlap is an answer, not an error. Raises ValueError if the common set is unbounded.
+        lens = overlap(Sphere(0.5), Placed(Sphere(0.5), position=(0.6, 0, 0)))
+        lens.volume, lens.volume_error, lens.depth, lens.normal
 
-    method 'auto' grows the hull of the dual points about a point well inside, in a frame in which the common set is round.
-    method 'paper' is that of Tereshchenko, Chevokin and Fisunenko, 'Algorithm for finding the domain intersection of a set of
-    polytopes' (ICCS 2013), step for step and with what it loses: GJK with witness points gives a common point; on a boundary
-    it is shifted by a minimal step (2^-26 of the smaller polytope) along one of 26 directions; the hull of the dual points of
-    all face planes, the dual of that hull's faces, and their hull follow; more than two bodies pairwise by divide and conquer.
-    It departs from the text in tessellating smooth shapes from inside, in replacing half-spaces by large boxes, and in
-    deciding by exact signs inside its hulls. Where no shift lands inside, it says 'touching'.
+    Each of `shapes` is a shape, a Placed, or an (n, 3) array of points, which stands for their convex hull. `tolerance`, between
+    0 and 1, is the allowed relative error of the volume for curved shapes. `converged` is False if it was not reached.
+    Polyhedra are exact and ignore it. No overlap is an answer, not an error. Raises ValueError if the common set is unbounded.
+
+    `method` 'auto' tries the ways of `Overlaps.WAYS` and always returns an answer. `method` 'paper' follows the article of
+    Tereshchenko, Chevokin and Fisunenko, 'Algorithm for finding the domain intersection of a set of polytopes' (ICCS 2013). GJK
+    finds a common point. A point on a boundary is shifted by 2^-26 of the smaller polytope in one of 26 directions. If no
+    shifted point is inside both bodies, the status is 'touching'. The convex hull of the dual points of all face planes follows,
+    then its dual. More than two bodies are intersected in pairs, by divide and conquer. Three things differ from the article:
+    curved shapes are replaced by inscribed polytopes, half-spaces by large boxes, and hulls use exact predicates.
     """
 
 def distance(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike) -> float:
     """
-    Distance (m) of the nearest points of two shapes; 0 if they touch or overlap.
+    Distance (m) between the nearest points of two shapes. 0 if they touch or overlap.
     """
 
 def penetration_depth(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike) -> float:
     """
-    Length (m) of the least translation that separates two shapes; 0 if they do not overlap. Positive where pybullet's contact
-    distance is negative. Raises ValueError for two half-spaces.
+    Length (m) of the shortest translation that separates two shapes. 0 if they do not overlap. Positive where pybullet's
+    contact distance is negative. Raises ValueError for two half-spaces.
     """
 
 def iou(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001) -> float:
     """
-    Intersection over union of two shapes: common volume over the volume of their union, from 0 to 1.
+    Intersection over union of two shapes: the common volume divided by the volume of the union, from 0 to 1.
     """
 
 class Overlaps:

@@ -84,8 +84,8 @@ WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const Own
   }
   if (decided() || !(best.upper > margin)) return best;
   // Where many planes touch the largest ball, the simplex method may cycle. It does not cycle if each plane is moved
-  // out by a different small fraction of the radius. The bodies themselves then tell how far inside that ball's centre
-  // is.
+  // out by a different small fraction of the radius. The depth of that ball's centre then comes from the bodies
+  // themselves.
   basis = Basis(simplex);
   double part = 0;
   for (int round = 0; round < kMaxRounds && !decided(); ++round) {

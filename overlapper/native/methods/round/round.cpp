@@ -24,7 +24,7 @@ const RoundChoice& choose(const Placed& a, const Placed& b, bool outside) {
   return *std::ranges::find_if(kRoundChoices, [&](const RoundChoice& choice) { return choice.fits(traits); });
 }
 
-/// m³: the volume that the rounding of double-doubles moves, from which forms take depths and places.
+/// m³: the error of the volume by double-doubles, from which closed forms take depths and places.
 double misplaced(const Placed& a, const Placed& b, const Measures& m) {
   const double apart = norm(a.pose.translation - b.pose.translation);
   const bool turned = !unturned(a.orientation) || !unturned(b.orientation);

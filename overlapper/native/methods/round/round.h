@@ -9,7 +9,7 @@
 
 namespace overlapper {
 
-/// The kinds of two bodies: how many are of each.
+/// The number of bodies of each kind in a pair.
 struct RoundTraits {
   int balls = 0, capsules = 0, cylinders = 0;
   int stretched = 0;  ///< ellipsoids whose axes differ
@@ -18,11 +18,11 @@ struct RoundTraits {
   bool outside = false;  ///< the centre of the round body is outside the flat body
 };
 
-/// A line of the table: which two bodies, the closed forms that are tried in turn, and how the pair is sliced.
+/// A line of the table: a condition on the two bodies, the closed forms to try in turn, and the way to slice the pair.
 struct RoundChoice {
   const char* bodies;
   bool (*fits)(const RoundTraits&);
-  /// The answer with the least error counts. No form is tried after one that is right to kEnoughOfRound.
+  /// The result with the least error counts. No form is tried after a form with an error of at most kEnoughOfRound.
   std::array<closed_forms::ClosedForm, 3> forms;
   pieces::Slicing slicing;
 };
@@ -74,7 +74,7 @@ inline constexpr std::array<RoundChoice, 12> kRoundChoices{{
     {"all others", [](const RoundTraits&) { return true; }, {}, nullptr},
 }};
 
-/// The measures of an overlapping pair by a formula. `rounding` is how far a surface may be off, in m. Bodies are about
+/// The measures of an overlapping pair by a formula. `rounding` bounds the error of a surface, in m. Bodies are about
 /// `reference`, in any order.
 std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference);
 

@@ -114,7 +114,7 @@ class Tracing {
   std::vector<OwnedFacet> facets_;
 };
 
-// ------------------------------------------------------------------------------------------------------ where they cross
+// ------------------------------------------------------------------------------------------------------------ the seam
 
 Vec3 Tracing::middle_of_chord(Vec3 point, Vec3 along, const Pose& pose) const {
   const Vec3 in_second = apply_transposed(pose.rotation, point - pose.translation),
@@ -198,7 +198,7 @@ bool Tracing::begin_inside(int body, int facet, Vec3 direction) {
   return inside > 0;
 }
 
-// -------------------------------------------------------------------------------------------------------- what they keep
+// ---------------------------------------------------------------------------------------------------------- kept parts
 
 /// Builds the common polytope. Asks the other body about every kept vertex. A vertex outside shows an unknown line of
 /// the seam, and the construction starts again.
@@ -353,7 +353,7 @@ bool Tracing::keep_vertex(int body, int vertex) {
   return true;
 }
 
-// ------------------------------------------------------------------------------------------------------------- measures
+// ------------------------------------------------------------------------------------------------------------ measures
 
 double extent(Vec3 v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 

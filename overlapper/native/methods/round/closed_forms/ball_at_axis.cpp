@@ -33,15 +33,14 @@ constexpr std::array<Node, 12> kNodes{{
     {0.44977468483151917, 0.09997418797338287},
 }};
 
-/// How near a singularity may be to an end of an interval, over its width: the rule is then right to rounding. Nearer
-/// than kAtEnd, it is at the end.
+/// The least distance of a singularity from an end of an interval, over its width, at which the rule is accurate to
+/// rounding. A singularity nearer than kAtEnd counts as at the end.
 constexpr double kApart = 0.19, kAtEnd = 1e-11;
 /// The same for singularities off the real line, beside an end and beside the interior.
 constexpr double kApartBesideEnd = 0.4, kApartBeside = 0.9;
 /// The part of an interval that is split off beside a singularity.
 constexpr double kSplit = 1.0 / 6;
-/// The distance of the ball's centre from the axis, over both radii, from which sections are taken to be about one
-/// point.
+/// If the ball's centre is nearer to the axis, relative to the sum of both radii, sections count as concentric.
 constexpr double kLeastDistance = 1e-3;
 
 /// A ball and a body of revolution. Sections across the axis are two discs, `distance` apart; z counts from the ball's
@@ -56,8 +55,8 @@ struct BallAndAxis {
   double origin() const { return from_axis() ? 0 : distance.head; }
 };
 
-/// Integrals over what is shared. Heights count from the axis or from the ball's centre, whichever
-/// belongs to the smaller body, away from the axis.
+/// Integrals over the common set. Heights point away from the axis. They start at the axis or at the ball's centre,
+/// whichever belongs to the smaller body.
 struct SectionSums {
   double volume = 0, across = 0, along = 0;  ///< ∫ of 1, the height and z
   double area = 0;                           ///< m², of the surface
@@ -87,7 +86,7 @@ class Part {
  private:
   enum class Kind { kNothing, kLens, kBody, kBall };
 
-  /// What the section at some z needs, from how far z is from the ends of the interval.
+  /// The data of the section at some z, from the distances of z from the ends of the interval.
   struct Discs {
     DoubleDouble at;                       ///< z
     double z, of_body2, of_ball2, chord2;  ///< squares of the radii, and of the chord times the distance
@@ -203,7 +202,7 @@ class Part {
   Lens lens_of(const Discs& discs) const {
     Lens lens;
     lens.half = std::sqrt(std::max(0.0, discs.chord2)) / (2 * d_);
-    // The two heights are differences of what may be larger by far.
+    // The two heights are differences of numbers that may be much larger.
     const DoubleDouble slope = DoubleDouble{end_ ? 2.0 : 1.0} * (end_ ? level_ : discs.at);
     const DoubleDouble to_ball = (power_ - slope * discs.at) / (DoubleDouble{2} * at_.distance);
     lens.to_ball = to_ball.head, lens.to_body = (at_.distance - to_ball).head;
@@ -301,8 +300,8 @@ double nearer_end(const Revolved& body, const Revolved& other) {
   return distance(other.centre + arm) < distance(other.centre - arm) ? 1 : -1;
 }
 
-/// Whether all that a ball at the end of a capsule shares with the body is beyond the plane through its centre across
-/// the capsule's axis. The body is below its tangent plane nearest to the centre.
+/// Whether the common part of the body and a ball at the end of a capsule lies beyond a plane. The plane goes through
+/// the ball's centre, across the capsule's axis. The body is below its tangent plane nearest to the centre.
 bool keeps_beyond(const Revolved& body, Vec3 centre, double radius, Vec3 outward, double margin) {
   const Vec3 from = centre - body.centre;
   const double along = dot(from, body.axis), on_axis = std::clamp(along, -body.half_length, body.half_length);
@@ -313,7 +312,7 @@ bool keeps_beyond(const Revolved& body, Vec3 centre, double radius, Vec3 outward
   return reach_of_cap(radius, way / far, offset, -outward, margin) < 0;
 }
 
-/// The body `self` of the pair by its axis, and the other one, a ball or the nearer end of a capsule.
+/// Measures the body `self` of the pair, by its axis, and the other body: a ball, or the nearer end of a capsule.
 std::optional<MeasuresAndInertia> at_axis(const RoundPair& pair, int self) {
   constexpr double kMargin = 1e-9;  // relative to the capsule
   const Revolved &body = *pair.revolved[self], &other = *pair.revolved[1 - self];

@@ -8,8 +8,8 @@
 namespace overlapper::closed_forms {
 namespace {
 
-/// Measures of part of a ball, whose curved surface is the round body's and whose faces are the polyhedron's. `moments`
-/// are the second moments of the part about any point. Planes may be off by `rounding`.
+/// Measures of part of a ball. Its curved surface belongs to the round body, and its faces belong to the polyhedron.
+/// `moments` are the second moments of the part about any point. Planes may be off by `rounding`.
 MeasuresAndInertia measures_of(const quadric::BallPart& part, const Moments& moments, const RoundPair& pair,
                                Vec3 centre, double rounding) {
   const Mat3& rotation = pair.flat_body().pose.rotation;
@@ -23,7 +23,7 @@ MeasuresAndInertia measures_of(const quadric::BallPart& part, const Moments& mom
   return {std::move(q), rotation * moments.inertia_about_centroid() * transposed(rotation)};
 }
 
-/// A polyhedron whose own numbers are exact, about a centre in its own coordinates.
+/// A polyhedron with exact numbers of its own, about a centre in its own coordinates.
 class ExactAbout final : public quadric::WidePlaces {
  public:
   ExactAbout(const quadric::Polyhedron& polyhedron, const Shape& shape, const WideVector& centre)
@@ -55,7 +55,7 @@ std::optional<quadric::ShallowPart> shallow_part(const OwnPolyhedron& polyhedron
   return part;
 }
 
-/// A point of the pair's coordinates in the flat body's own.
+/// Maps a point of the pair's coordinates to the flat body's own coordinates.
 Vec3 in_flat(const RoundPair& pair, Vec3 point) {
   const Pose& pose = pair.flat_body().pose;
   return apply_transposed(pose.rotation, point - pose.translation);
@@ -113,7 +113,7 @@ std::optional<MeasuresAndInertia> shallow_end_in_polyhedron(const RoundPair& pai
   const WideAxis seen = seen_from(flat, capsule);
   const auto part = shallow_part(polyhedron, flat, seen.centre + side * capsule.half_length * seen.axis, r);
   if (!part) return std::nullopt;
-  // The whole part is farther along the way to the apex than `distance`. Doubles know the apex to kApex.
+  // The whole part is farther than `distance` in the direction of the apex. The error of the apex in doubles is kApex.
   constexpr double kApex = 1e-7;
   const double distance = norm(part->apex);
   if (!(reach_of_cap(r, part->apex / -distance, -distance, -side * axis, kApex * r) < 0)) return std::nullopt;

@@ -97,7 +97,7 @@ struct Image {
   double area = 0;  ///< of the part of the ball
 };
 
-/// `error`: of the volume of the part of the ball. Planes may be off by `rounding` in the world.
+/// `error`: error of the volume of the ball's part. `rounding` bounds the error of planes in the world.
 Measures measures_of(const Image& image, double error, const RoundPair& pair, const quadric::Stretch& stretch,
                      double rounding) {
   const Placed& body = pair.round_body();
@@ -105,7 +105,7 @@ Measures measures_of(const Image& image, double error, const RoundPair& pair, co
     return body.pose.translation + body.pose.rotation * scaled(stretch.half_axes, of_ball);
   };
   Measures q = measures_in_closed_form();
-  // An upper bound, until it is measured.
+  // This is an upper bound, until the area is measured.
   q.area_known = false, q.area = max_component(stretch.cofactors) * image.area;
   q.facets_touched = image.faces;
   q.volume = stretch.volume * image.volume;

@@ -11,12 +11,13 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A ball, or the end of a capsule, where dot(outward, x − centre) >= 0; every side of a ball is one.
+/// A ball, or the end of a capsule, where dot(outward, x − centre) >= 0. Every side of a ball is such an end.
 struct RoundEnd {
   Vec3 centre, outward;
 };
 
-/// How far the cap dot(normal, x − centre) <= offset of a ball keeps to the outer side of an end, at least.
+/// Lower bound of the distance of a ball's cap, dot(normal, x − centre) <= offset, from an end's plane on its outer
+/// side.
 double clearance(const RoundEnd& end, Vec3 centre, double radius, Vec3 normal, double offset, double rounding) {
   return dot(end.outward, centre - end.centre) - reach_of_cap(radius, normal, offset, -end.outward, rounding);
 }
@@ -32,7 +33,8 @@ std::optional<MeasuresAndInertia> lens_of_balls(const RoundPair& pair, Vec3 a, V
   if (!(distance > abs(wider))) {
     (ra <= rb ? height_a : height_b) = 2 * std::min(ra, rb);
   } else {
-    // The smaller by the formula, the other as the rest: a circle misplaced by rounding then moves no volume.
+    // The formula gives the smaller height, and the other one is the rest. A circle misplaced by rounding then moves no
+    // volume.
     const bool a_higher = wider.head < 0;
     const DoubleDouble less = depth * (distance - abs(wider)) / (DoubleDouble{2} * distance);
     height_a = (a_higher ? depth - less : less).head, height_b = (a_higher ? less : depth - less).head;
@@ -59,13 +61,13 @@ std::optional<MeasuresAndInertia> lens_of_balls(const RoundPair& pair, Vec3 a, V
 
 }  // namespace
 
-/// If every point of the common set lies beyond the ends of both bodies, the ends are all that matters: the set is
-/// connected, and around the lens there is nothing else of them.
+/// If every point of the common set lies beyond the ends of both bodies, only the ends matter. The common set is
+/// connected, and no other parts of the bodies are around the lens.
 std::optional<MeasuresAndInertia> lens(const RoundPair& pair) {
   std::vector<RoundEnd> ends;
   const Revolved &a = *pair.revolved[0], &b = *pair.revolved[1];
   WideVector between = wide_difference(b.placed->position, a.placed->position);
-  // The end of a body that is nearer to the other.
+  // The end of a body that is nearer to the other body.
   const auto end = [&](const Revolved& body, Vec3 other, double side) {
     if (body.half_length == 0) return body.centre;
     const bool back = dot(body.axis, other - body.centre) < 0;

@@ -7,9 +7,9 @@
 namespace overlapper::closed_forms {
 namespace {
 
-/// From parts more remote than that, slices know second moments better.
+/// If a part is more remote than this, slices give more accurate second moments.
 constexpr double kRemote = 100;
-/// The fraction of a body's reach from a plane of its ends within which a corner leaves the pair to slices.
+/// If a corner is this near to the plane of an end, relative to the body's reach, slices measure the pair.
 constexpr double kFlush = 1e-9;
 
 /// Sums over the parts of a long body, about its centre, along its axes.
@@ -20,8 +20,8 @@ struct LongBodySums {
   Pull on_body{};
 };
 
-/// Adds what a cylinder without ends shares with a polyhedron that the planes of its ends have cut. False if that
-/// cannot be told.
+/// Adds the common part of an infinite cylinder and a polyhedron that the planes of the ends have cut. False if this
+/// part is uncertain.
 bool add_middle(const quadric::Rings& part, const Revolved& body, LongBodySums& sums) {
   if (part.empty()) return true;
   const auto middle = quadric::measure_cylinder(part, body.radius);
@@ -34,8 +34,8 @@ bool add_middle(const quadric::Rings& part, const Revolved& body, LongBodySums& 
   return true;
 }
 
-/// Adds what the half ball about the height `end` shares with the rest of the polyhedron there. False if that cannot be
-/// told.
+/// Adds the common part of the half ball about the height `end` and the rest of the polyhedron there. False if this
+/// part is uncertain.
 bool add_end(quadric::Rings& part, double end, const Revolved& body, LongBodySums& sums) {
   if (!part.cut(end, end < 0)) return false;
   if (part.empty()) return true;
@@ -50,7 +50,7 @@ bool add_end(quadric::Rings& part, double end, const Revolved& body, LongBodySum
   return true;
 }
 
-/// Whether a corner is in the plane of an end, but for rounding: a cut there would leave slivers, or faces twice.
+/// Whether a corner is in the plane of an end, up to rounding. A cut there would leave slivers or duplicate faces.
 bool flush(const quadric::Rings& polyhedron, const Revolved& body) {
   const double r = body.radius, h = body.half_length;
   for (const Vec3 corner : polyhedron.corners())

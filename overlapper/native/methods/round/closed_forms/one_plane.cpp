@@ -11,8 +11,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// An upper bound, no lower than it takes to be `enough`, of dot(direction, x) over the part of `body` below the plane,
-/// about its centre: by weak duality, reach(direction − λ normal) + λ offset for any λ >= 0, a convex function of λ.
+/// An upper bound of dot(direction, x) over the part of `body` below the plane, about its centre. The search for the
+/// least bound ends once the bound is `enough`. By weak duality, reach(direction − λ normal) + λ offset is a bound for
+/// any λ >= 0. It is a convex function of λ.
 double reach_below(const Revolved& body, Vec3 normal, double offset, Vec3 direction, double rounding, double enough) {
   if (body.ball()) return reach_of_cap(body.radius, normal, offset, direction, rounding);
   const auto bound = [&](double lambda) {

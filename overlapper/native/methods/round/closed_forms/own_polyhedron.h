@@ -22,7 +22,7 @@ class OwnPolyhedron {
     });
     polyhedron_ = {corners_, planes_, edges(shape), planes_.size()};
   }
-  /// Without edges if there is none.
+  /// Empty if the shape has no edges.
   const quadric::Polyhedron& operator*() const { return polyhedron_; }
 
  private:

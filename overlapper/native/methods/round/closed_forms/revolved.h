@@ -23,14 +23,14 @@ struct Revolved {
   }
 };
 
-/// Nothing for bodies of other kinds. An ellipsoid with equal axes is a ball.
+/// No value for bodies of other kinds. An ellipsoid with equal axes is a ball.
 std::optional<Revolved> revolved(const Placed& body);
 
-/// The largest dot(direction, x) over the part of a ball about the origin below a plane, for unit vectors. Where planes
-/// may be off by `rounding`, the answer is no less than that maximum. `offset` is between -r and r.
+/// The largest dot(direction, x) over the part of a ball about the origin below a plane, for unit vectors. If planes
+/// may be off by `rounding`, the result is an upper bound of this maximum. `offset` is between -r and r.
 double reach_of_cap(double r, Vec3 normal, double offset, Vec3 direction, double rounding);
 
-/// The turn of a body's axes into the world.
+/// The rotation from a body's axes to the world's axes.
 WideMatrix wide_turn(const Placed& body);
 
 /// The direction of a body's z axis in the world.
@@ -40,7 +40,7 @@ WideVector axis_of(const Placed& body);
 struct WideAxis {
   WideVector centre, axis;
 };
-/// Those of a body, in the own coordinates of another. A ball has no axis.
+/// The centre and the axis of `body` in the own coordinates of `other`. A ball has no axis.
 WideAxis seen_from(const Placed& other, const Revolved& body);
 
 }  // namespace overlapper::closed_forms

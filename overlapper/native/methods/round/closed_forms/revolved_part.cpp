@@ -15,10 +15,11 @@ RevolvedPart half_ball(double r) {
   return {volume, {3 * r / 8 * volume, 0, 0}, 0, {}, 2 * kPi * r * r, volume};
 }
 
-/// The depth, over the radius, up to which a part of a half ball lies within 75° of where it is seen from.
+/// Up to this depth, relative to the radius, a part of a half ball lies within 75° of the place that it is seen from.
 constexpr double kShallowHalf = 0.2;
 
-/// The same, shallow. It is seen from the line where the plane meets x = 0, `edge` deep in the ball.
+/// Like half_ball_below(), for a shallow part. It is seen from the line where the plane meets x = 0, `edge` deep in the
+/// ball.
 RevolvedPart shallow_half_ball_below(double r, double sine, double cosine, double cut_radius, double edge) {
   quadric::ShallowBall ball(r, edge);
   // Along the line, then −x, then −y.
@@ -64,14 +65,15 @@ RevolvedPart half_ball_below(double r, double sine, double cosine, double t, dou
     return rest;
   }
   if (height <= kShallowHalf * r) return shallow_half_ball_below(r, sine, cosine, rho, edge / cosine);
-  // Half the angle of the cut's arc, of the arc on x = 0, and the exterior angle of the spherical part where they meet.
-  // All three from the same root, so that what rounding did to it cancels in the sum.
+  // Half the angle of the cut's arc, half the angle of the arc on x = 0, and the exterior angle of the spherical part
+  // where they meet. All three come from the same root, so that its rounding error cancels in the sum.
   const double root = std::sqrt((r * cosine - t) * edge);
   const double arc = std::atan2(root, -t * sine), base_arc = std::atan2(root, -t);
   const double exterior = std::atan2(root, -sine * r);
   // The theorem of Gauss and Bonnet.
   const double spherical = r * r * (2 * kPi - 2 * exterior) + 2 * r * t * arc;
-  // Segments of discs: area, and second moment about the disc's centre as that of a sector less that of a triangle.
+  // Segments of discs: the area, and the second moment about the disc's centre. This moment is that of a sector minus
+  // that of a triangle.
   const double width = root / cosine;
   const auto segment = [width](double radius, double half_angle, double over) {
     const double area = radius * radius * half_angle - over * width;
@@ -96,13 +98,12 @@ RevolvedPart half_ball_below(double r, double sine, double cosine, double t, dou
 
 struct CylinderBelow {
   RevolvedPart part;
-  double lower_end, upper_end;  ///< m²: what is left of the flat ends
+  double lower_end, upper_end;  ///< m²: remaining area of the flat ends
 };
 
-/// The part of the cylinder |x| <= h, y² + z² <= r², where sine * x + cosine * y <= t; both >= 0. Slices of
-/// constant y are rectangles, 2 √(r² − y²) wide, whose length falls from 2 h to nothing while y crosses the cut; with
-/// y = −r cos θ every integrand is a trigonometric polynomial. `enter` and `leave` are as in
-/// PlaneCut.
+/// The part of the cylinder |x| <= h, y² + z² <= r², where sine * x + cosine * y <= t; both are >= 0. Slices of
+/// constant y are rectangles of width 2 √(r² − y²). Their length falls from 2 h to 0 while y crosses the cut. With y =
+/// −r cos θ, every integrand is a trigonometric polynomial. `enter` and `leave` are as in PlaneCut.
 CylinderBelow cylinder_below(double r, double h, double sine, double cosine, double enter, double leave) {
   CylinderBelow result{{}, 0, 0};
   RevolvedPart& part = result.part;
@@ -129,7 +130,7 @@ CylinderBelow cylinder_below(double r, double h, double sine, double cosine, dou
     part.flat_moment.y = part.flat_area * (start - r);
     return result;
   }
-  // Where rounding alone has kept the cut from the far side, nothing is left, and the formula for it is 0 / 0.
+  // If only rounding keeps the cut from the far side, the rest is empty, and the formula for the rest is 0 / 0.
   const double rest = kPi - full;
   const double width =
       open ? rest : std::min(rest, angle_between(r, start, (enter <= 0 ? leave : 2 * sine * h) / cosine));

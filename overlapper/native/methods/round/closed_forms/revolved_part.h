@@ -55,9 +55,9 @@ RevolvedPart cap(double r, double h, Vec3 direction);
 struct PlaneCut {
   double sine = 0, cosine = 0;  ///< of its normal, along the axis and across
   double offset = 0;            ///< about the centre
-  double upper = 0, lower = 0;  ///< how far into the balls about the ends of the axis it is
-  /// How far it has passed the side y = -r, times the cosine: where it enters the upper end of the cylinder, and
-  /// where it leaves the lower one.
+  double upper = 0, lower = 0;  ///< depth of the plane in the balls about the ends of the axis
+  /// The distance by which the plane has passed the side y = -r, times the cosine: `enter` where it enters the upper
+  /// end of the cylinder, and `leave` where it leaves the lower end.
   double enter = 0, leave = 0;
 };
 PlaneCut cut_of(const Revolved& body, const WideAxis& at, const WidePlane& plane);

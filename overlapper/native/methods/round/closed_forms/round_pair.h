@@ -13,10 +13,10 @@ namespace overlapper::closed_forms {
 struct RoundPair {
   std::array<const Placed*, 2> body;
   std::array<std::optional<Revolved>, 2> revolved;  ///< the bodies that are balls, capsules or cylinders
-  double rounding;                                  ///< m: how far a surface may be off
+  double rounding;                                  ///< m: error of surfaces
   Vec3 reference;
   std::array<Vec3, 2> positions;  ///< of the bodies, about the reference
-  // Where one body is a half-space, a box or a hull:
+  // Only if one body is a half-space, a box or a hull:
   int self = 0;                 ///< number of the round body
   std::vector<Plane> planes{};  ///< of the flat body
   bool outside = false;         ///< the centre of the round body is outside the flat body
@@ -26,7 +26,7 @@ struct RoundPair {
 };
 RoundPair round_pair(const Placed& a, const Placed& b, double rounding, Vec3 reference);
 
-/// Measures of bodies that overlap, by a closed form; all numbers are zero.
+/// Measures of bodies that overlap, for a closed form; all numbers are still zero.
 inline Measures measures_in_closed_form() {
   Measures m;
   m.status = Status::kOverlapping;

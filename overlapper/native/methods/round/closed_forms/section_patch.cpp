@@ -13,13 +13,13 @@ constexpr double kPi = std::numbers::pi;
 struct SymmetricSection {
   double area = 0, first = 0, along = 0, across = 0;  ///< ∫ 1, p, p² and z² dA
 
-  /// A strip of that area at p, which reaches `half` to either side.
+  /// Adds a strip of this area at p. It extends by `half` to either side.
   void add(double strip, double p, double half) {
     area += strip, first += strip * p, along += strip * p * p, across += strip * half * half / 3;
   }
 };
 
-/// Adds the section of a cylinder. p counts from under the lowest point of its lower end, plus `from`.
+/// Adds the section of a cylinder. p is measured from the place under the lowest point of its lower end, plus `from`.
 void add_side(double r, double h, const PlaneCut& cut, double from, SymmetricSection& section) {
   const double sine = cut.sine, cosine = cut.cosine, wide = 2 * r * cosine;
   if (cut.leave <= 0 || cut.enter >= wide) return;
@@ -42,8 +42,8 @@ void add_side(double r, double h, const PlaneCut& cut, double from, SymmetricSec
   });
 }
 
-/// Adds the section of a half ball that looks along `side`, where p of its centre is `from`. The plane is `height` into
-/// the ball, and `edge` into its disc, times the cosine.
+/// Adds the section of a half ball that looks along `side`. `from` is the p of its centre. The plane is `height` deep
+/// in the ball. It is `edge` deep in the ball's disc, times the cosine.
 void add_end(double r, double sine, double cosine, double t, double height, double edge, double side, double from,
              SymmetricSection& section) {
   if (height <= 0 || t >= r) return;

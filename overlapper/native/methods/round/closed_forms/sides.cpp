@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// The depth, over the smaller radius, up to which a contact at sides is shallow.
+/// A contact at sides is shallow up to this depth, relative to the smaller radius.
 constexpr double kShallowSides = 0.25;
 
 /// The common part of two cylinders in a shallow contact far from all ends. Heights count from the first axis towards
@@ -19,25 +19,25 @@ struct SideContact {
   double volume = 0;
   double height = 0;  ///< m: of the centroid
   double area = 0;    ///< m²
-  double force = 0;   ///< m²: what a body's volume grows by as it moves towards the other
+  double force = 0;   ///< m²: growth of the volume as a body moves towards the other body
 };
 
-/// How far a contact of that depth reaches to either side of a circle's nearest point.
+/// The half-width of a contact of this depth, about the nearest point of a circle.
 double half_width(double radius, double depth) { return std::sqrt(depth * (2 * radius - depth)); }
 
-/// How far that contact reaches along the first axis, to either side.
+/// The half-length of this contact along the first axis.
 double reach_of_crossing(double r, double s, double depth, double sine, double cosine) {
-  // The half-widths of each where the other but touches it.
+  // The half-widths of each body where the other body only touches it.
   const double of_first = half_width(r, depth), of_second = half_width(s, depth);
   return (of_second + of_first * cosine) / sine;
 }
 
-/// Two cylinders, the directions of their axes of that sine.
+/// Two cylinders. `sine` is the sine of the angle between their axes.
 ///
-/// Slices along both axes are parallelograms as wide as the cylinders there. Heights are t = r − depth (1 + cos θ) / 2:
-/// widths are then half-angle sines and cosines times analytic functions, and what is integrated has a period of half a
-/// turn, so that its sum over the middles of equal parts converges geometrically. The nearest singularities are on the
-/// far sides of the cylinders: e^-3.4, for contacts as deep as are shallow.
+/// Slices along both axes are parallelograms, as wide as the cylinders there. With heights t = r − depth (1 + cos θ) /
+/// 2, widths are half-angle sines and cosines times analytic functions. The integrand then has a period of half a turn,
+/// and its sum over the middles of equal parts converges geometrically. The nearest singularities are on the far sides
+/// of the cylinders. For the deepest shallow contacts, the ratio is e^-3.4.
 SideContact sides_crossing(double r, double s, double depth, double sine) {
   constexpr int kNodes = 8;
   SideContact sum;
@@ -59,7 +59,7 @@ SideContact sides_crossing(double r, double s, double depth, double sine) {
   return {weight * depth * sum.volume, moment / sum.volume, weight * sum.area, weight * sum.force};
 }
 
-/// `normal` leads from the axis of the first body, from the point `foot`, to the second body.
+/// `normal` leads from the axis of the first body, at the point `foot`, to the second body.
 MeasuresAndInertia measures_of(const SideContact& contact, const RoundPair& pair, Vec3 foot, Vec3 normal,
                                double twist) {
   Measures q = measures_in_closed_form();
@@ -72,7 +72,7 @@ MeasuresAndInertia measures_of(const SideContact& contact, const RoundPair& pair
   return {q, {}};
 }
 
-/// The fraction of its length by which a contact at the side of a body keeps off the end.
+/// The least distance of a contact at the side from the end of the body, relative to the body's length.
 constexpr double kEndMargin = 1e-9;
 
 bool shallow_at_sides(double r, double s, DoubleDouble depth) {
@@ -83,7 +83,7 @@ bool shallow_at_sides(double r, double s, DoubleDouble depth) {
 std::optional<MeasuresAndInertia> crossing_sides(const RoundPair& pair) {
   const Revolved &a = *pair.revolved[0], &b = *pair.revolved[1];
   const double r = a.radius, s = b.radius;
-  // Where the axes are nearest to each other, along each, as far as doubles know.
+  // The places along each axis where the axes are nearest to each other, in doubles.
   const Vec3 plain = b.centre - a.centre, across = cross(a.axis, b.axis);
   const double cosine = dot(a.axis, b.axis), sine2 = norm2(across);
   const double on_a = dot(plain, a.axis), on_b = dot(plain, b.axis);
@@ -103,7 +103,7 @@ std::optional<MeasuresAndInertia> crossing_sides(const RoundPair& pair) {
   const SideContact contact = sides_crossing(r, s, depth.head, sine);
   const bool turned = signed_distance_of_axes.head < 0;
   const Vec3 normal = rounded(common / wide_sine) * (turned ? -1.0 : 1.0);
-  // The volume is inversely as the sine of the angle between the axes, which the first turns towards the second.
+  // The volume is inversely proportional to the sine of the angle by which the first axis turns to the second.
   const double twist = (turned ? -1 : 1) * contact.volume * cosine / sine;
   return measures_of(contact, pair, a.centre + along_a * a.axis, normal, twist);
 }

@@ -69,7 +69,7 @@ Principal principal(const Mat3& k) {
   return {{value[order[0]], value[order[1]], value[order[2]]}, {axis[order[0]], axis[order[1]], axis[order[2]]}};
 }
 
-/// The direction across the slices. There are two; it is the one that is more across the contact.
+/// The direction across the slices. There are two such directions; this is the one that is more across the contact.
 Vec3 across_slices(const Principal& of, Vec3 contact) {
   const auto& [low, middle, high] = of.value;
   const double whole = high - low;
@@ -79,7 +79,7 @@ Vec3 across_slices(const Principal& of, Vec3 contact) {
   return unit(std::abs(overlapper::dot(a, contact)) <= std::abs(overlapper::dot(b, contact)) ? a : b);
 }
 
-/// Axes of a slice, and what K makes of them.
+/// Axes of a slice, and their images by K.
 struct Axes {
   Vec3 n, x, y;
   WideVector along_n, along_x, along_y;  ///< K n, K x, K y
@@ -96,7 +96,7 @@ struct Axes {
   }
 };
 
-/// Axes whose slices are discs as nearly as doubles can tell. Newton's method tilts them until the form of the second
+/// Axes whose slices are discs up to the rounding of doubles. Newton's method tilts them until the form of the second
 /// body is the same in all directions of the plane.
 Axes settled_axes(Vec3 normal, const WideMatrix& k) {
   Axes axes(normal, k);
@@ -115,7 +115,8 @@ Axes settled_axes(Vec3 normal, const WideMatrix& k) {
   return axes;
 }
 
-/// The t where a radius vanishes on either side of the inner point. `square` is positive at zero and concave.
+/// The values of t, on either side of the inner point, where a radius vanishes. `square` is positive at zero and
+/// concave.
 std::array<double, 2> ends_of(const Quadratic& square) {
   const double half = square[1] / 2, bend = -square[2], root = std::sqrt(half * half + bend * square[0]);
   if (half > 0) return {-square[0] / (half + root), (half + root) / bend};
@@ -134,8 +135,8 @@ std::array<double, 2> Discs::range() const {
   return {std::max(a_low, b_low), std::min(a_high, b_high)};
 }
 
-/// With the middle value above the geometric mean of the others, the largest is nearer to it than the smallest is, and
-/// rounding, which is relative to the largest, matters less.
+/// If the middle value is above the geometric mean of the others, the largest value is nearer to it than the smallest
+/// value. Rounding is relative to the largest value, so it matters less then.
 bool better_first(const StretchedBall& first, const StretchedBall& second) {
   const Vec3 a = rounded(first.half_axes), b = rounded(second.half_axes);
   if (first.ball || second.ball) {
@@ -182,7 +183,7 @@ std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& seco
   const DoubleDouble value = (axes.xx + axes.yy) / DoubleDouble{2}, round = one / value;
   const DoubleDouble c_n = overlapper::dot(c, wide(axes.n)), c_x = overlapper::dot(c, wide(axes.x)),
                      c_y = overlapper::dot(c, wide(axes.y));
-  // About -c_n in the plane where the first body's surface is across c. A small slack keeps the foot from running off.
+  // About -c_n, in the plane where the first body's surface is across c. A small slack keeps the foot near.
   const double steep = c_x.head * c_x.head + c_y.head * c_y.head + slack_first.head;
   const Flat lean{-c_n.head * c_x.head / steep, -c_n.head * c_y.head / steep};
   result.lean = lean, result.first_level = c_n.head;
@@ -214,8 +215,8 @@ std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& seco
   result.first_square = {(slack_first + c_x * c_x + c_y * c_y).head, 2 * c_n.head, -1};
   const DoubleDouble p_x = round * overlapper::dot(axes.along_n, axes.along_x),
                      p_y = round * overlapper::dot(axes.along_n, axes.along_y);
-  // A section that is not quite a disc has the area of one. The square of the radius is a difference, which may be
-  // small beside what the section's shape then changes.
+  // A section that is not quite a disc is replaced by a disc of equal area. The square of the radius is a difference.
+  // It may be small relative to its change by the section's shape.
   const DoubleDouble whole = value / (axes.xx * axes.yy - axes.xy * axes.xy);
   const auto dot_in_section = [&](DoubleDouble a_x, DoubleDouble a_y, DoubleDouble b_x, DoubleDouble b_y) {
     return whole * (axes.yy * a_x * b_x + axes.xx * a_y * b_y - axes.xy * (a_x * b_y + a_y * b_x));

@@ -71,9 +71,9 @@ struct Discs {
   Quadratic difference;                   ///< slack of the first less that of the second
   Quadratic first_square, second_square;  ///< of the radii
   double first_level;                     ///< t of the first body's centre
-  double oval;                            ///< how far the sections of the second are off discs, relative
+  double oval;                            ///< relative deviation of the second body's sections from discs
   double second_rise;                     ///< height in the second's own ball per t
-  double misplaced = 0;                   ///< slack that double-doubles misplace, in units of the last bit
+  double misplaced = 0;                   ///< error of slacks by double-doubles, in units of the last bit
   Mat3 second_ball;                       ///< K
   Vec3 second_middle;                     ///< k
   WideMatrix first_rotation;
@@ -91,7 +91,7 @@ struct Discs {
 /// No value if the inner point is not inside both.
 std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& second);
 
-/// Whether sections have rounder discs, relative to rounding, if `first` is made a ball.
+/// Whether sections are closer to discs, relative to rounding, if `first` becomes the ball.
 bool better_first(const StretchedBall& first, const StretchedBall& second);
 
 }  // namespace overlapper::lenses

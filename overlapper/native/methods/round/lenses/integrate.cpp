@@ -13,7 +13,7 @@ namespace {
 using slicing::Rule;
 using slicing::Series;
 
-/// A relative error of a rule that does.
+/// If the relative error of a rule is not larger, no finer rule follows.
 constexpr double kVolumeError = 2e-15, kAreaError = 1e-11;
 constexpr int kMostHalvings = 40;
 constexpr int kMostRules = 400;

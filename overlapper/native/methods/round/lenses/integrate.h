@@ -11,8 +11,8 @@ struct Integral {
   int nodes = 0;
 };
 
-/// Integrates between the changes of outlines, as slicing::integrate() does: with t = m − h cos θ, slices are analytic
-/// in θ. Where the last terms of a rule's series do not do, a finer rule follows, or the interval is halved.
+/// Integrates between the changes of outlines, as slicing::integrate() does. With t = m − h cos θ, slices are analytic
+/// in θ. If the last terms of a rule's series are too large, a finer rule follows, or the interval is halved.
 Integral integrate(const Discs& discs, const Wanted& wanted);
 
 }  // namespace overlapper::lenses

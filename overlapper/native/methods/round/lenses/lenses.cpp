@@ -55,7 +55,7 @@ struct ToWorld {
             stretch.volume * scaled(scaled(h, h), own.squares),
             stretch.volume * scaled(stretch.cofactors, own.products)};
   }
-  /// ∫ x × n dA of ∫ y Nᵀ dA.
+  /// ∫ x × n dA, from ∫ y Nᵀ dA.
   Vec3 moment(const Mat3& moved) const {
     const Mat3 axes = transposed({discs.normal, discs.x, discs.y});
     const Mat3 w = axes * moved * transposed(axes);

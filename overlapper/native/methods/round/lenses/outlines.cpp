@@ -89,7 +89,7 @@ Changes changes(const Discs& discs) {
   Roots bends;
   const Roots touching = roots<4>(chord, low, high, &bends);
   for (int i = 0; i < touching.count; ++i) result.add(touching.t[i]);
-  // Where the circles nearly touch, or coincide, outlines change within little.
+  // If the circles nearly touch, or coincide, outlines change within a short interval.
   for (int i = 0; i < bends.count; ++i) {
     const double t = bends.t[i];
     double size = 0, power = 1;

@@ -6,9 +6,9 @@
 
 namespace overlapper::lenses {
 
-/// Values of t, in ascending order: the ends of the common set, and where the outline of slices changes between them. A
-/// few more are among them: where the two circles nearly touch, and in geometric steps away from a place near which
-/// something changes beside the interval.
+/// Values of t, in ascending order: the ends of the common set, and the changes of the slices' outline between them.
+/// There are some further values: where the two circles nearly touch, and in geometric steps away from a change just
+/// outside an interval.
 struct Changes {
   std::array<double, 64> t;
   int count = 0;
@@ -19,11 +19,11 @@ struct Changes {
 };
 Changes changes(const Discs& discs);
 
-/// What two discs share.
+/// The common part of two discs.
 enum class Outline { kNothing, kFirst, kSecond, kLens };
 
-/// The discs in a slice, in the slice's own axes: `ahead` from the first centre to the second, and `aside`. Places
-/// count from the foot.
+/// The discs in a slice, in the slice's own axes: `ahead` from the first centre to the second, and `aside`. Places are
+/// relative to the foot.
 struct Section {
   Outline outline;
   Flat ahead;                  ///< unit

@@ -41,7 +41,7 @@ double bulge(const Arc& a) {
 Mat3 outer(Vec3 a, Vec3 b) { return {a.x * b, a.y * b, a.z * b}; }
 Mat3 operator+(const Mat3& a, const Mat3& b) { return {a.row0 + b.row0, a.row1 + b.row1, a.row2 + b.row2}; }
 
-/// A slice with what its parts need. Vectors have a component across the slices, then two within.
+/// A slice, with the data for its parts. Vectors have one component across the slices, then two in the plane.
 struct Place {
   const Discs& discs;
   double t;
@@ -57,7 +57,7 @@ struct Place {
   Vec3 world(Vec3 v) const { return v.x * discs.normal + v.y * discs.x + v.z * discs.y; }
 };
 
-/// Adds a set that has `ahead` for an axis of symmetry through the origin, shifted to `middle`.
+/// Adds a set with the axis of symmetry `ahead` through the origin, shifted to `middle`.
 void add_moments(const Place& place, Vec3 middle, double area, double ahead, double along, double across, Sums& sums) {
   const Vec3 e = place.ahead, f = place.aside;
   const Vec3 first = ahead * e + area * middle, g = ahead * e;
@@ -114,10 +114,10 @@ void add_patch(const Place& place, Vec3 centre, const Arc& a, const View& view, 
     }
 }
 
-/// By how much rounding moves the arcs of a lens, as slacks of both discs, in units of the last bit. The half chord is
-/// a root of slack + aside² + chord (2 along − chord). Here `along` and `aside` are the mean centre in the slice's own
-/// axes, and the chord is half the difference of the slacks, over the distance of the centres. Places themselves are as
-/// far as `reach` from the foot.
+/// The movement of a lens's arcs by rounding, as slacks of both discs, in units of the last bit. The half chord is a
+/// root of slack + aside² + chord (2 along − chord). Here `along` and `aside` are the mean centre in the slice's own
+/// axes. The chord is half the difference of the slacks, over the distance of the centres. Places are at most `reach`
+/// from the foot.
 void add_blur_of_lens(const Place& place, const Arc& first, const Arc& second, double reach, Sums& sums) {
   const Discs& d = place.discs;
   const Section& s = place.section;
@@ -129,7 +129,7 @@ void add_blur_of_lens(const Place& place, const Arc& first, const Arc& second, d
   const double sizes = size_at(d.slack, t) + size_at(d.difference, t) * (1 + lever / apart);
   const double terms = sizes + away * away + d.misplaced + 2 * aside * (centres + along * bend) +
                        2 * chord * (centres + (aside + lever) * bend);
-  // A centre that is misplaced along the line of centres changes its segment.
+  // A misplaced centre along the line of centres changes its segment.
   const double to_centres = centres + size_at(d.apart, t) + chord * bend;
   sums.blur = (first.half_angle + second.half_angle) * terms +
               2 * to_centres * (first.radius * bulge(first) + second.radius * bulge(second));
@@ -137,7 +137,7 @@ void add_blur_of_lens(const Place& place, const Arc& first, const Arc& second, d
   sums.terms = terms;
 }
 
-/// The same of a whole disc.
+/// The same for a whole disc.
 void add_blur_of_disc(const Place& place, double half_angle, const Quadratic& square, bool is_second, Sums& sums) {
   const double terms = size_at(square, place.t) + place.discs.misplaced;
   sums.blur = half_angle * terms;

@@ -14,7 +14,7 @@ struct View {
   Vec3 u, v, weight;
 };
 
-/// What is summed beside volume, moments and area vectors.
+/// The wanted sums besides volume, moments and area vectors.
 struct Wanted {
   const quadric::Stretch *first = nullptr, *second = nullptr;  ///< for areas, if they are wanted
   std::optional<View> view;
@@ -25,8 +25,8 @@ struct Sums {
   Moments moments;
   Vec3 force;              ///< ∫ N dA over the unit sphere's part
   Mat3 moved{{}, {}, {}};  ///< ∫ y Nᵀ dA
-  double blur = 0;         ///< volume by the size of the terms of slacks, of which rounding takes a share
-  double oval = 0;         ///< the same by squares of places: sections that are no discs move the surface by these
+  double blur = 0;         ///< volume change by slacks as large as their terms; rounding is a fraction of it
+  double oval = 0;         ///< the same for squares of places: non-circular sections move the surface relative to these
   double terms = 0;        ///< the largest of those terms
   double first_area = 0, second_area = 0;  ///< m²
   std::array<double, 6> patch{};           ///< ∫ 1, u, v, u², uv, v² of the weight

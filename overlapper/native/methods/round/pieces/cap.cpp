@@ -7,7 +7,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// A cap, with integrals about its tip: along the normal n of its disc, which leads from the tip, and across.
+/// A cap, with integrals about its tip: along the normal n of its disc, which leads away from the tip, and across n.
 struct Cap {
   double height, volume, disc;
   Vec3 n, tip;
@@ -26,7 +26,7 @@ struct Cap {
   }
 };
 
-/// Adds second moments. A shallow cap is far less along its axis than across.
+/// Adds second moments. A shallow cap is much smaller along its axis than across it.
 void add_second_moments(const Cap& cap, Moments& sum) {
   const double volume = cap.volume, first = cap.first, along = cap.along, across = cap.across;
   const Vec3 n = cap.n, tip = cap.tip;

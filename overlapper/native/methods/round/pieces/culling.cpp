@@ -23,7 +23,7 @@ Culling::PlainRound::PlainRound(const Round& round) : radius(round.radius) {
 
 Vec3 Culling::PlainRound::outward(Vec3 point) const {
   Vec3 from = point - centre;
-  // If the point is far along the axis, the first time leaves rounding.
+  // If the point is far along the axis, the first subtraction leaves rounding.
   for (int again = 0; again < 2; ++again) from -= dot(from, axis) * axis;
   const double length = std::sqrt(norm2(from));
   return length > 0 ? from / length : Vec3{};
@@ -70,7 +70,7 @@ void Culling::enclose(const Pieces& pieces, const EnclosingPolytope& common, Enc
     around_ = common;
     part.round = piece.round < 0 ? PlainRound{} : PlainRound(pieces.rounds[piece.round]);
     bool something = cut_around(pieces, piece);
-    // Planes that touch a round where the rest is: the second time, less of that is left.
+    // Cuts with planes that touch the round beside the remaining part. Less of it remains the second time.
     for (int again = 0; something && piece.round >= 0 && again < 2; ++again) {
       const Vec3 normal = part.round.outward(around_.middle());
       if (normal != Vec3{}) something = around_.cut({normal, part.round.reach(normal) + margin_, kNoWall});
@@ -154,7 +154,7 @@ bool Culling::meet(int p, int q, Meeting& meeting) const {
 }
 
 bool Culling::share(const Meeting& meeting, EnclosingPolytope& polytope) const {
-  // Every cut looks at all corners.
+  // Every cut visits all corners.
   const auto work = [](const EnclosedPiece& part, const std::vector<int>& of_other) {
     return part.around.corners.size() * (of_other.size() + part.uncut.size() + 1);
   };

@@ -17,8 +17,8 @@ void EnclosingPolytope::become(const Bounds& box) {
     Corner corner{{x ? upper.x : lower.x, y ? upper.y : lower.y, z ? upper.z : lower.z},
                   {i ^ 1, i ^ 2, i ^ 4},
                   {4 + z, x, 2 + y}};
-    // Seen from outside, the edges along x, y and z follow each other one way at a corner and the other way at the
-    // next.
+    // Seen from outside, the edges along x, y and z have one cyclic order at a corner and the opposite order at the
+    // next corner.
     if ((x + y + z) % 2 == 0) std::swap(corner.beside[1], corner.beside[2]), corner.face = {2 + y, x, 4 + z};
     corners.push_back(corner);
   }
@@ -59,7 +59,7 @@ bool EnclosingPolytope::cut(const Face& face) {
       stays.beside[along] = static_cast<int>(corners.size());
       corners.push_back(added);
     }
-  // Along each face that was cut, from the corner where its border comes back inside to that where it has left.
+  // Follows each cut face from the corner where its border enters the inside to the corner where it has left it.
   const int all = static_cast<int>(corners.size());
   for (int start = before; start < all; ++start) {
     int from = start, to = corners[start].beside[0];

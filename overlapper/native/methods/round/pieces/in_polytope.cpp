@@ -18,7 +18,7 @@ constexpr double kSureOfMoments = 5e-11;
 
 using Face = EnclosingPolytope::Face;
 
-/// The error of a polytope's volume by the rounding of corners that cuts have made.
+/// The error of a polytope's volume by the rounding of corners from cuts.
 double rounding_of(const EnclosingPolytope& polytope, double border) {
   return 16 * DBL_EPSILON * polytope.extent() * border;
 }
@@ -35,7 +35,7 @@ bool sure(const Totals& piece, size_t faces, const Totals& totals) {
 struct PolytopeSums {
   Totals piece;
   std::optional<PatchSums> patch;
-  double cancelled = 0;  ///< of products that areas are the differences of, times heights
+  double cancelled = 0;  ///< sizes of the products whose difference is an area, times heights
 };
 
 /// The area of a face, and ∫ x dA over it.
@@ -44,8 +44,8 @@ struct FaceArea {
   Vec3 first;
 };
 
-/// No tetrahedron is negative, but by rounding. Across a needle, the height is small and its triangles are as long as
-/// the needle; along the needle, it is the other way round.
+/// Only rounding makes a tetrahedron negative. In a needle, a face with a small height has triangles as long as the
+/// needle. A face with a large height has small triangles.
 FaceArea add_tetrahedra(const EnclosingPolytope& polytope, const Face& face, std::span<const int> ring, Vec3 apex,
                         PatchSums* patch, PolytopeSums& sums) {
   const double height = face.slack - dot(face.normal, apex);
@@ -95,7 +95,7 @@ bool add_polytope(const EnclosingPolytope& polytope, const DistinctWalls& distin
   return true;
 }
 
-/// The common part of a round and a polytope, about a centre, in axes that `turn` turns to.
+/// The common part of a round and a polytope, about a centre, in the axes after `turn`.
 struct RoundPart {
   int owner;  ///< of the round
   Pull curved;
@@ -150,7 +150,8 @@ bool add_round_part(const RoundPart& part, const EnclosingPolytope& polytope, To
   return true;
 }
 
-/// The surface of a part of a cylinder is closed: the other surfaces, from behind, show what its curved part does.
+/// The surface of a part of a cylinder is closed. The other surfaces, seen from behind, therefore have the same
+/// integrals as its curved part.
 void add_to_patch(const RoundPart& part, const PatchView& view, PatchSums& patch) {
   const bool rest = part.owner == view.owner;
   const Vec3 u = part.turn * view.u, v = part.turn * view.v;
@@ -209,8 +210,8 @@ struct AboutBall {
   std::vector<std::array<int, 3>> number;
   std::vector<int> left;
 
-  /// Lengths up to `nothing` are rounding. The centre may be a corner of the polytope, where faces that go through it
-  /// meet. All edges of a corner end where that corner is.
+  /// Lengths up to `nothing` are rounding. The centre may be a corner of the polytope, on several of its faces. All
+  /// edges at a corner end at the same place.
   void become(const EnclosingPolytope& polytope, const DistinctWalls& distinct, Vec3 centre, double nothing) {
     corners.clear(), planes.clear(), edges.clear(), owners.clear(), misplaced = 0;
     polytope.number_faces(number, left);
@@ -253,11 +254,11 @@ bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const Distin
   const auto found =
       quadric::measure_ball({about->corners, about->planes, about->edges, faces, about->misplaced}, {}, ball.radius);
   if (!found || found->sections.empty()) return true;
-  // A convex set has less surface than a convex set around it, unless a turn is wrong.
+  // The surface of a convex set is smaller than the surface of a convex set around it, unless a turn is wrong.
   if (!(found->volume >= 0 && found->area <= (1 + 1e-9) * polytope.surface())) return false;
   Totals piece;
   static_cast<Moments&>(piece) = *found, piece.error = found->error + nothing * found->area;
-  // A wrong direction matters to the area of a small ball before it matters to the volume.
+  // A wrong direction changes the area of a small ball before it changes the volume.
   if (!(piece.error <= limit(faces) * ball.radius * (sums.totals.area + found->area))) return false;
   const RoundPart part{ball.owner,    {-found->flat, {}}, found->area, about->planes,
                        about->owners, found->sections,    {},          centre};

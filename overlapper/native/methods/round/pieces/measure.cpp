@@ -14,11 +14,12 @@
 namespace overlapper::pieces {
 namespace {
 
-/// Largest fraction of a volume between planes that count as one; the second if nothing else closes the surface.
+/// Largest fraction of a volume between planes that count as one. The second limit applies if nothing else closes the
+/// surface.
 constexpr double kLayer = 1e-12, kWideLayer = 1e-9;
 
-/// Of bodies with more planes, only those near the common set are looked at: the time of slices grows with the cube of
-/// their number.
+/// If a body has more planes, only the planes near the common set are used. The time of slices grows with the cube of
+/// the number of planes.
 constexpr int kManyPlanes = 8;
 
 double least_radius(const Pieces& pieces) {
@@ -31,7 +32,7 @@ double least_radius(const Pieces& pieces) {
 struct BothPieces {
   Pieces a, b;
 
-  /// False if moving the surface of the body with the larger round leaves nothing of something round.
+  /// False if nothing of a round shape is left after the surface of the body with the larger round was moved.
   bool become(const SlicedPair& pair, const EnclosingPolytope* common) {
     a.clear(), b.clear();
     cut(pair.a, pair.b, common, 0, pair.reference, pair.inside, a);
@@ -177,8 +178,8 @@ struct ManyPieces {
     distinct_.walls.assign(meeting_.walls.begin(), meeting_.walls.end());
     if (is_flat(distinct_.walls, setting, sums.totals.error)) return true;
     find_repeated(distinct_, setting, sums.totals.error);
-    // If the surface of the whole does not close, slices measure the round pieces, too, until planes near each other
-    // count as one.
+    // If the surface of the whole does not close, slices also measure the round pieces, until nearby planes count as
+    // one.
     const Round* round = rounds_.empty() ? nullptr : &rounds_[0];
     const bool sliced = rounds_.size() > 1 || (round && setting.closely && setting.layer == 0);
     if (!sliced && add_in_polytope(round, polytope_, distinct_, setting, sums)) return true;
@@ -199,7 +200,7 @@ struct ManyPieces {
   // For the two pieces that meet.
   std::vector<Round> rounds_;
   Culling::Meeting meeting_;
-  EnclosingPolytope polytope_;  ///< around what they share
+  EnclosingPolytope polytope_;  ///< around their common part
   DistinctWalls distinct_;
   std::vector<SlicedPart> parts_;
 };

@@ -12,10 +12,10 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// How far from each other, over the extent, planes may be that are counted from beside one of them.
+/// Planes at most this far from each other, relative to the extent, are in one slab.
 constexpr double kOneSlab = 1e-6;
 
-/// 1 if a wall leaves nothing of one of the rounds, -1 if it leaves all of one, beyond rounding.
+/// 1 if a wall leaves nothing of one of the rounds. -1 if the wall leaves all of one of them, beyond rounding.
 int side_of(const Wall& wall, std::span<const Round> rounds) {
   int side = 0;
   for (const Round& r : rounds) {
@@ -24,7 +24,7 @@ int side_of(const Wall& wall, std::span<const Round> rounds) {
     double reach = r.radius;
     if (!r.ball) {
       const double along = dot(n, rounded(r.axis));
-      // The borders of a piece are walls as well, and orthogonal to the axis: these must stay.
+      // The borders of a piece are also walls, and they are orthogonal to the axis. These walls must stay.
       if (1 - along * along < 1e-20) continue;
       reach = r.radius * std::sqrt(1 - along * along) + std::abs(along) * r.half_length;
     }
@@ -35,8 +35,8 @@ int side_of(const Wall& wall, std::span<const Round> rounds) {
   return side;
 }
 
-/// Whether a wall touches a ball, but for a disc that is nothing beside the whole: slices would see it come and go by
-/// rounding. The part that the wall cuts off counts as an error.
+/// Whether a wall only touches a ball, so that the disc of their crossing is negligible. Rounding would make this disc
+/// appear in some slices and vanish in others. The part that the wall cuts off counts as an error.
 bool nicks(const Wall& wall, std::span<const Round> rounds, double extent, Totals& totals) {
   const auto cut_off = [&](const Round& r) {
     const Vec3 n = rounded(wall.normal), c = rounded(r.centre);
@@ -53,8 +53,8 @@ bool nicks(const Wall& wall, std::span<const Round> rounds, double extent, Total
   return true;
 }
 
-/// Drops a cylinder that holds the other round: it leaves all of that, and where it touches that from outside along a
-/// line, slices would show nothing but rounding. The part that sticks out counts as an error.
+/// Drops a cylinder that contains the other round, because it cuts nothing off. Where the cylinder touches that round
+/// from outside along a line, slices would show only rounding. The part that sticks out counts as an error.
 void drop_around(std::vector<Round>& rounds, Totals& totals) {
   if (rounds.size() < 2) return;
   for (int i = 0; i < 2; ++i) {
@@ -73,7 +73,8 @@ void drop_around(std::vector<Round>& rounds, Totals& totals) {
   }
 }
 
-/// If the radical plane parts two balls, the common set is the part of either ball beyond it.
+/// If two balls cross, the radical plane cuts the common set in two. Each part is the part of one ball beyond the
+/// plane.
 bool add_balls(const Round& a, const Round& b, std::span<const Wall> walls, const EnclosingPolytope* around,
                const PieceSetting& setting, Sums& sums) {
   const WideVector between = a.centre - b.centre;
@@ -93,7 +94,7 @@ bool add_balls(const Round& a, const Round& b, std::span<const Wall> walls, cons
   return add_piece(std::span(&b, 1), with, around, setting, sums);
 }
 
-/// Two walls leave what the first leaves where it is the nearer, and what the second leaves on the rest.
+/// Adds the part where the first wall is nearer, within the first wall. Then adds the rest, within the second wall.
 bool add_beside(const Fold& fold, const SlicedPiece& piece, const PieceSetting& setting, Sums& sums) {
   for (const bool first : {true, false}) {
     std::vector<Wall> with = piece.walls;
@@ -104,7 +105,8 @@ bool add_beside(const Fold& fold, const SlicedPiece& piece, const PieceSetting& 
   return true;
 }
 
-/// Between planes whose lines rush across slices, these are cut, and counted from beside one of them on either side.
+/// Cuts the piece into slabs between planes whose lines rush across slices. In each slab, coordinates are relative to a
+/// point beside one of these planes.
 bool add_slabs(std::span<const slicing::Rushing> rushing, const SlicedPiece& piece, const PieceSetting& setting,
                Sums& sums) {
   const WideVector across = unit(cross(piece.rounds[0].axis, piece.rounds[1].axis));
@@ -125,7 +127,7 @@ bool add_slabs(std::span<const slicing::Rushing> rushing, const SlicedPiece& pie
   return true;
 }
 
-/// False, and nothing is added, if slices about the point inside are not sure to a fraction of the whole that matters.
+/// Adds nothing and returns false if slices about the inner point are too inaccurate relative to the whole.
 bool add_surely(const SlicedPiece& piece, const PieceSetting& setting, Sums& sums) {
   Sums with = sums;
   if (!add_slices(piece, setting, with)) return false;
@@ -135,8 +137,8 @@ bool add_surely(const SlicedPiece& piece, const PieceSetting& setting, Sums& sum
   return true;
 }
 
-/// Axes of slices are chosen by what is near the point that coordinates count from. Beside the point inside, a shallow
-/// piece has more digits about that point than about the middle of what encloses the piece.
+/// The point that coordinates are relative to determines the axes of slices. If a shallow piece lies beside the inner
+/// point, that point gives more digits than the middle of the enclosing polytope.
 bool add_placed(const SlicedPiece& piece, const PieceSetting& setting, Sums& sums) {
   if (!piece.around) return add_slices(piece, setting, sums);
   const Vec3 middle = piece.around->middle();
@@ -160,7 +162,7 @@ bool add_piece(std::span<const Round> rounds, std::span<const Wall> walls, const
     if (cuts == 0 && !nicks(wall, rounds, setting.extent, sums.totals)) distinct.walls.push_back(wall);
   }
   if (is_flat(distinct.walls, setting, sums.totals.error)) return true;
-  // One wall per plane: two lines that are one cross nowhere, or, by rounding, anywhere.
+  // Keeps one wall per plane. Two lines of one plane cross nowhere, or anywhere by rounding.
   find_repeated(distinct, setting, sums.totals.error);
   SlicedPiece piece{{rounds.begin(), rounds.end()}, std::move(distinct.walls), setting.extent, around};
   std::erase_if(piece.walls, [](const Wall& wall) { return wall.owner == DistinctWalls::kSuperseded; });

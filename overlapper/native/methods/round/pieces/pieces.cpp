@@ -10,16 +10,16 @@
 namespace overlapper::pieces {
 namespace {
 
-/// The number of planes, those of the box included, that the polytope around the common set is cut with. The polytope
-/// need not be tight, and every piece of a body is cut out of it.
+/// The number of planes, including those of the box, that cut the polytope around the common set. This polytope need
+/// not be tight, and each piece of a body is cut from it.
 constexpr size_t kMostFaces = 64;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Mat3 rounded(const WideMatrix& m) { return {rounded(m.row0), rounded(m.row1), rounded(m.row2)}; }
 
-/// Places the pieces of a body in the world, in double-double. Only what is near the polytope around the common set
-/// matters or, if that is not known, near the other body.
+/// Places the pieces of a body in the world, in double-double. Leaves out parts far from the polytope around the common
+/// set. If that polytope is not known, leaves out parts far from the other body.
 class PlacingCutter final : public Cutter {
  public:
   PlacingCutter(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
@@ -112,7 +112,7 @@ class PlacingCutter final : public Cutter {
     result_.walls.push_back({normal, slack, owner});
   }
 
-  /// Where the region surely is, by doubles.
+  /// The certain position of the region, by doubles.
   enum class Side { kBeyond, kInside, kBoth };
   Side side_of(const Plane& local) const {
     const Vec3 n = plain_rotation_ * local.normal;
@@ -142,8 +142,8 @@ class PlacingCutter final : public Cutter {
 /// Whether two unit normals are the same.
 bool same(const WideVector& a, const WideVector& b) { return norm2(overlapper::rounded(a - b)) < 1e-30; }
 
-/// Whether a piece is part of the prism on a facet: beyond the facet of the core and below the face, with some cuts
-/// from the side.
+/// Whether a piece is part of the prism on a facet. Such a piece lies beyond the facet of the core and below the face,
+/// within some lateral cuts.
 bool on_facet(std::span<const Wall> prism, const Wall& of_core, size_t sides) {
   return prism.size() == 2 + sides && prism[0].owner == slicing::kCut && same(prism[0].normal, -of_core.normal) &&
          prism[1].owner != slicing::kCut && same(prism[1].normal, of_core.normal);

@@ -47,9 +47,9 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
 void cut(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
          const WideVector& inside, Pieces& result);
 
-/// Where the walls that are left of a rounded hull are those of one facet or of one edge, fewer pieces are the same
-/// set: what is below the facet; at an edge, what is below the plane through the lines where the cylinder meets both
-/// facets, and the segment of the cylinder beyond that plane.
+/// Joins pieces of a rounded hull if the remaining walls belong to one facet or one edge. Fewer pieces then make the
+/// same set. For a facet, this is everything below the facet. For an edge, it is everything below the plane through the
+/// lines where the cylinder meets both facets, and the segment of the cylinder beyond that plane.
 void join(Pieces& pieces);
 
 /// Moves the surface of a body out, but not the cuts through the body; false if nothing of a round shape is left.

@@ -13,11 +13,11 @@ namespace {
 using slicing::Integrals;
 using slicing::Stack;
 
-/// The fraction of a volume that may stay open before rules are made finer.
+/// Finer rules are tried if a larger fraction of the volume may be missing.
 constexpr double kClosed = 1e-12;
-/// The fraction of all else that is measured that a piece among many may leave open: what they leave open adds up.
+/// One piece among many may miss this fraction of the tolerated missing volume, because the missing volumes add up.
 constexpr double kShare = 0.02;
-/// The fraction of a piece that may stay open where its centroid tells whether it lies outside.
+/// The largest missing fraction of a piece at which its centroid still tells whether the piece lies outside.
 constexpr double kTold = 1e-6;
 
 /// The point of coordinates (x, y, t) in the world.
@@ -26,7 +26,7 @@ Vec3 in_world(const Stack& stack, Vec3 v) { return v.x * stack.l + v.y * stack.m
 /// The best sums over stacks of one piece.
 struct BestSum {
   slicing::Sum best, tried;
-  double open = 0;  ///< m³: what may be missing of the best
+  double open = 0;  ///< m³: possibly missing volume of the best sum
   slicing::DrawnIntervals intervals;
 };
 
@@ -36,12 +36,12 @@ struct PieceContext {
   const PieceSetting& setting;
   const Sums& sums;  ///< over the pieces before
 
-  /// The size beside which a piece may be open or inexact.
+  /// The size that missing volume and errors of a piece are compared with.
   double share_of(double size) const { return piece.around ? kShare * size : size; }
   bool closed(const BestSum& sum, double part = 1) const {
     return sum.open <= part * kClosed * (share_of(sums.totals.volume) + sum.best.integrals.volume);
   }
-  /// Pieces whose walls leave something there are convex, and reach no farther.
+  /// Pieces with a remaining part are convex, so a piece with its centroid outside has no common part.
   bool outside(Vec3 centroid) const { return setting.common && setting.common->excludes(centroid + piece.offset); }
 };
 
@@ -58,7 +58,7 @@ slicing::View view_of(const Stack& stack, const PatchView& seen, Vec3 offset) {
   return view;
 }
 
-/// The stack of one of the ways to lay slices; nothing where there are not so many.
+/// The stack for direction number `way` of the slices. No value if there are fewer directions.
 std::optional<Stack> stack_of(const PieceContext& at, int way) {
   const SlicedPiece& piece = at.piece;
   std::optional<Stack> stack = slicing::stack_of(piece.rounds, piece.walls, piece.extent, way);
@@ -74,7 +74,7 @@ std::optional<Stack> stack_of(const PieceContext& at, int way) {
   return stack;
 }
 
-/// Returns by what factor less is open than before.
+/// Returns the new missing volume divided by the missing volume before.
 double keep_better(const Stack& stack, const PieceContext& at, bool few, double strictness, BestSum& sum) {
   const Totals& before = at.sums.totals;
   const double volume = at.share_of(before.volume), area = at.share_of(before.area);
@@ -86,14 +86,14 @@ double keep_better(const Stack& stack, const PieceContext& at, bool few, double 
 
 void refine(const Stack& stack, const PieceContext& at, BestSum& sum) {
   if (!at.closed(sum) && !at.setting.stretch) keep_better(stack, at, false, 0, sum);
-  // The rules end where the volume is exact. Where areas are not yet, the surface does not close.
+  // The rules stop once the volume is accurate. If the areas are not accurate yet, the surface does not close.
   if (!at.closed(sum) && !slicing::find_drawn_intervals(stack, true, sum.intervals)) return;
   for (double strictness = 1; strictness < 1e9 && !at.closed(sum); strictness *= 1e3)
     if (!(keep_better(stack, at, false, strictness, sum) < 0.5) && strictness > 1e3) break;
 }
 
-/// Where a piece that is small beside its way from its point, or as thin along one of the axes, has more digits:
-/// nothing if that point is near it.
+/// A point about which the piece has more digits. It is given if the piece is small along one of the axes, relative to
+/// its distance from its own point. No value if its own point is near the piece already.
 std::optional<Vec3> nearer_point(const Stack& stack, const SlicedPiece& piece, const Integrals& s) {
   const Vec3 mean = s.first / s.volume, offset = in_world(stack, mean);
   const Vec3 away = scaled(mean, mean), spread = s.squares / s.volume - away;
@@ -108,21 +108,20 @@ bool add_near(const SlicedPiece& piece, Vec3 step, const PieceSetting& setting, 
   return add_slices(nearer, setting, sums);
 }
 
-/// Whether nothing is farther away than anything may be. If not, it is rounding.
+/// Whether the moments are possible within the extent. If not, the piece is only rounding.
 bool sound(const Stack& stack, const Integrals& s, double extent) {
   const double far = 8 * extent * (1 + std::abs(stack.shear.x) + std::abs(stack.shear.y)), volume = std::abs(s.volume);
   return norm(s.first) <= far * volume && std::abs(s.squares.x + s.squares.y + s.squares.z) <= far * far * volume;
 }
 
-/// The error of a volume that slices have summed, by rounding and by the rules.
+/// The error of a volume that slices have summed: rounding, and the error of the rules.
 double error_of(const slicing::Sum& sum) {
   const Integrals& s = sum.integrals;
   return sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
 }
 
-/// Adds a piece by slices about its centroid, if these leave less open or uncertain. The point inside may be at an end
-/// of a long piece, where a surface is near that is far from the rest: slices suit that end, and the rest has fewer
-/// digits.
+/// Adds a piece by slices about its centroid, if less is missing or uncertain then. The inner point may be at one end
+/// of a long piece, near a surface that is far from the rest. Slices then suit that end, and the rest has fewer digits.
 bool add_about_centroid(const PieceContext& at, const Stack& stack, const BestSum& sum, Sums& sums) {
   const Integrals& s = sum.best.integrals;
   const double off = sum.open + error_of(sum.best);
@@ -157,15 +156,15 @@ void add_sum(const Stack& stack, const slicing::Sum& sum, Vec3 offset, const qua
   if (sums.patch) sums.patch->add(s.seen[0], s.seen[1], s.seen[2], s.seen[3], s.seen[4], s.seen[5]);
 }
 
-/// Looks at a stack closely if the setting says so. Where more changes, closely, than can be told, the middle of every
-/// interval says more.
+/// Finds the intervals of a stack, with close sampling if the setting says so. If close sampling finds too many
+/// changes, the middle of every interval is used instead.
 bool look_at(const Stack& stack, bool closely, slicing::DrawnIntervals& intervals) {
   return slicing::find_drawn_intervals(stack, closely, intervals) ||
          (closely && slicing::find_drawn_intervals(stack, false, intervals));
 }
 
-/// Slices across other axes hide less of where surfaces pass or touch each other. `stack` becomes the one of the best
-/// sum. True if there is one that can be told.
+/// Tries slices across other axes, where touching surfaces may be less hidden. `stack` becomes the stack of the best
+/// sum. True if intervals were found for at least one of these axes.
 bool try_other_axes(const PieceContext& at, Stack& stack, BestSum& sum) {
   bool told = false;
   for (int other = 1; other < slicing::kAxes && !at.closed(sum, 2); ++other) {
@@ -201,7 +200,7 @@ bool add_slices(const SlicedPiece& piece, const PieceSetting& setting, Sums& sum
   const bool told = look_at(*stack, setting.closely, sum.intervals);
   if (told && sum.intervals.intervals.empty()) return true;
   if (told) {
-    // The terms of few nodes tell too little of a stretched area.
+    // With few nodes, the terms say too little about a stretched area.
     keep_better(*stack, at, !setting.stretch, 0, sum);
     if (!at.closed(sum, 0.1))
       if (const auto step = nearer_point(*stack, piece, sum.best.integrals))
@@ -210,7 +209,7 @@ bool add_slices(const SlicedPiece& piece, const PieceSetting& setting, Sums& sum
     if (add_about_centroid(at, *stack, sum, sums)) return true;
   }
   if (!try_other_axes(at, *stack, sum) && !told) return false;
-  // Slices that are not sure at all may be those of another piece.
+  // Inaccurate slices may show another piece.
   const double volume = sum.best.integrals.volume;
   if (sum.open <= kTold * volume && at.outside(in_world(*stack, sum.best.integrals.first) / volume)) return true;
   sums.totals.open += sum.open;

@@ -8,8 +8,7 @@
 namespace overlapper::pieces {
 namespace {
 
-/// Makes a ball of radius 1 of an ellipsoid, and of pieces what that makes of them, turned to the axes of the
-/// ellipsoid.
+/// Maps an ellipsoid to a ball of radius 1, and maps the pieces with it. The axes are those of the ellipsoid.
 void into_ball(const Placed& ellipsoid, Vec3 h, Pieces& pieces) {
   const WideMatrix rotation = wide_rotation(ellipsoid.orientation);
   for (Round& r : pieces.rounds) {
@@ -24,7 +23,7 @@ void into_ball(const Placed& ellipsoid, Vec3 h, Pieces& pieces) {
   }
 }
 
-/// The same view, in a ball that is turned and stretched to the ellipsoid. Coordinates there count from `origin`.
+/// The same view for a ball that is turned and stretched to the ellipsoid. Coordinates of the ball are about `origin`.
 PatchView stretched_view(const PatchView& view, const Mat3& turn, const quadric::Stretch& stretch, Vec3 origin) {
   PatchView result;
   result.owner = view.owner;
@@ -39,20 +38,20 @@ struct StretchedPieces {
   Pieces of_flat, of_ellipsoid;
 };
 
-/// The sums of a ball and planes that are best.
+/// The best sums of a ball and planes.
 struct BallSums {
   Sums sums;
   double error = std::numeric_limits<double>::infinity();
-  Vec3 moved;  ///< where they count from
+  Vec3 moved;  ///< the point that the sums are about
 };
 
-/// Moves the point that coordinates count from.
+/// Moves the origin of coordinates.
 void move(std::span<Round> rounds, std::vector<Wall>& walls, Vec3 step) {
   for (Round& r : rounds) r.centre = r.centre - wide(step);
   for (Wall& wall : walls) wall.slack = wall.slack - dot(wall.normal, wide(step));
 }
 
-/// About the centroid, other slices are taken, which may do where the first do not.
+/// Slices about the centroid are different ones, and may be accurate where the first slices are not.
 BallSums best_of_ball(std::span<Round> rounds, std::vector<Wall>& walls, const SlicedPair& pair, int owner,
                       const Mat3& turn, const quadric::Stretch& stretch) {
   BallSums best;
@@ -77,8 +76,8 @@ BallSums best_of_ball(std::span<Round> rounds, std::vector<Wall>& walls, const S
   return best;
 }
 
-/// The error of each entry of the inertia. Half axes may differ by as much as a cap is shallow, so that what rounding
-/// leaves of one term counts for all.
+/// The error of each entry of the inertia. Half axes may differ by as large a factor as a cap is shallow. The rounding
+/// of one term may then be as large as all others.
 double inertia_error(const Totals& totals, const quadric::Stretch& stretch) {
   const Vec3 h = stretch.half_axes;
   const Moments& sizes = totals.sizes;
@@ -91,7 +90,7 @@ double inertia_error(const Totals& totals, const quadric::Stretch& stretch) {
 
 }  // namespace
 
-/// Volumes grow by the determinant, and area vectors are images by the matrix of cofactors.
+/// Volumes are multiplied by the determinant. The matrix of cofactors maps area vectors.
 std::optional<RoundMeasures> measure_stretched(const SlicedPair& pair) {
   const bool swapped = stretched(pair.b.shape) == nullptr;
   const Placed &flat = swapped ? pair.b : pair.a, &ellipsoid = swapped ? pair.a : pair.b;

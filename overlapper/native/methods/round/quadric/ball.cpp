@@ -19,9 +19,9 @@ constexpr double kUnit = 0x1p-53;  ///< of rounding
 /// Relative error of a length: 4 roundings for a unit vector, one for a difference, 3 for their product. Relative to
 /// the size of the numbers.
 constexpr double kPlacing = 8 * kUnit;
-constexpr double kOpen = 1e-9;  ///< of the radius' square: areas are right to less, without a wrong turn
+constexpr double kOpen = 1e-9;  ///< relative to the squared radius: errors of areas are smaller unless a turn is wrong
 
-/// A sum that is rounded but once.
+/// A sum that is rounded only once.
 class SumRoundedOnce {
  public:
   SumRoundedOnce& operator+=(DoubleDouble term) {
@@ -37,36 +37,37 @@ class SumRoundedOnce {
 };
 
 /// The disc that a face's plane cuts from the ball, with sums over the face's part of the disc, edge by edge. Seen from
-/// the middle, that part is a polygon of triangles, and sectors for the remaining angles.
+/// the middle, that part consists of triangles, and of sectors for the remaining angles.
 struct Disc {
   double height = 0;     ///< of the plane over the centre
   double square = 0;     ///< of the radius ρ; 0 if the plane does not reach the ball
-  bool around = true;    ///< the face holds the middle, as none of its edges lies this side of that
+  bool around = true;    ///< the face contains the middle: no edge lies on this side of the middle
   bool touched = false;  ///< by an edge
-  int ends = 0;          ///< of edges, on the sphere
-  double whole = 0;      ///< twice the area of the face, as its edges tell
-  SumRoundedOnce angle;  ///< of the edges' parts inside the ball, as the middle sees them
-  double sizes = 0;      ///< of these
+  int ends = 0;          ///< number of ends of edges on the sphere
+  double whole = 0;      ///< twice the area of the face, from its edges
+  SumRoundedOnce angle;  ///< of the edges' parts inside the ball, seen from the middle
+  double sizes = 0;      ///< sum of the sizes of these angles
   SumRoundedOnce twice;  ///< twice the area of their triangles
   double second = 0;     ///< four times ∫ |y|² dA over the triangles
   Vec3 first;            ///< ∫ y dA over triangles and sectors
   Vec3 third;            ///< ∫ (|y|² − ρ²) y dA over the same
-  /// Where the ball's centre is a corner of the face, from there along the edge that comes and the one that goes.
+  /// If the ball's centre is a corner of the face: directions from there, along the edge that arrives and the edge that
+  /// leaves.
   Vec3 comes, goes;
 };
 
 /// The part of an edge inside the ball, seen from the middle of a disc. Lengths along the edge are relative to its
 /// nearest point to the centre.
 struct DiscChord {
-  Vec3 out, along;  ///< unit, in the disc's plane: from the face across the edge, and along that
-  double height;    ///< of the edge's line over the middle, positive if that is on the side of the face
+  Vec3 out, along;  ///< unit, in the disc's plane: from the face across the edge, and along the edge
+  double height;    ///< of the edge's line over the middle, positive if the middle is on the side of the face
   double from, to;
 
   double distance2(double t) const { return height * height + t * t; }
 };
 
-/// Takes from a disc the sector from one unit vector to another. The directions of its arc sum to the opposite of those
-/// of the edges.
+/// Removes the sector between two unit vectors from a disc. The directions of its arc sum to the opposite of those of
+/// the edges.
 void add_sector(Vec3 out, Disc& disc) {
   const double cube = disc.square * std::sqrt(disc.square);
   disc.first += cube / 3 * out;
@@ -86,7 +87,7 @@ double add(const DiscChord& chord, Disc& disc) {
   const double part = h2 / 5 - disc.square / 3;
   const double squares = length * (from + to), fourths = squares * (from * from + to * to);
   disc.third += h2 * (part * length + cubes / 15) * out + h * (part * squares / 2 + fourths / 20) * along;
-  // Seen from an end of itself, it takes up no angle.
+  // A chord seen from one of its own ends has no angle.
   if (chord.distance2(from) > 0 && chord.distance2(to) > 0) {
     const double begin = 1 / std::sqrt(chord.distance2(from)), end = 1 / std::sqrt(chord.distance2(to));
     add_sector((from * begin - to * end) * out + h * (end - begin) * along, disc);
@@ -131,13 +132,13 @@ struct BallAndPolyhedron {
 struct BallSums {
   BallPart part;
   int characteristic;            ///< of the curved part (Euler)
-  SumRoundedOnce curved, cones;  ///< the curved part's area, by r²; Σ h A
+  SumRoundedOnce curved, cones;  ///< the area of the curved part, over r²; Σ h A
   double sizes = 0, cone_sizes = 0;
   double flats = 0;     ///< m², of all faces
   double pressure = 0;  ///< Σ h ∫ (|x|² − r²) dA
 };
 
-/// An edge, seen along itself: both planes and the line in which they meet, from one plane's height and the line's.
+/// An edge, seen along itself: both planes and the line where they meet, from the heights of one plane and of the line.
 struct SeenEdge {
   Vec3 n, m, along, out;
   double length, cosine, sine;
@@ -153,7 +154,7 @@ struct SeenEdge {
     length = std::sqrt(norm2(between));
     const Vec3 p = corner - at.centre;
     along = between / length, out = cross(along, n);
-    // No zero is negative, whose angle would be on the other side.
+    // No zero may be negative: its angle would be on the other side.
     cosine = dot(n, m), sine = std::max(0.0, dot(out, m));
     from_middle = p == Vec3{}, to_middle = at.polyhedron.corners[edge.to] == at.centre;
     height = through() ? 0 : dot(out, p) + 0.0;
@@ -162,7 +163,7 @@ struct SeenEdge {
   }
 };
 
-/// Adds to the discs what an edge tells of the whole faces.
+/// Adds the contribution of an edge to the sums of the whole faces.
 void add_border(const SeenEdge& edge, Disc& left, Disc& right) {
   if (edge.from_middle) left.goes = right.comes = edge.along;
   if (edge.to_middle) left.comes = right.goes = -edge.along;
@@ -171,7 +172,7 @@ void add_border(const SeenEdge& edge, Disc& left, Disc& right) {
   if (edge.other < 0) right.around = false;
 }
 
-/// Adds the error of an edge's part inside. The two chords make `beside` of the ball.
+/// Adds the error of an edge's part inside. `beside` is the size of the sectors of its two chords.
 void add_error(const SeenEdge& edge, const DiscChord& left, const DiscChord& right, bool from_inside, bool to_inside,
                double beside, double left_height, double r3, double misplaced_corners, double& error) {
   const double far = std::abs(edge.first) + std::abs(edge.height) + std::abs(left_height);
@@ -194,8 +195,8 @@ void add_short_edge(const Edge& edge, const BallAndPolyhedron& at, BallSums& sum
   ++sums.characteristic;
 }
 
-/// The ends of an edge's part inside, along the edge; nothing if there is none. An edge along the sphere may seem to
-/// end on that beyond a corner: the corner counts.
+/// The ends of an edge's part inside, along the edge. No value if there is no such part. An edge along the sphere may
+/// seem to end on the sphere beyond a corner; the corner then counts.
 std::optional<std::array<double, 2>> range_inside(const SeenEdge& edge, bool from_inside, bool to_inside,
                                                   const Disc& left, const Disc& right) {
   const double half = std::sqrt(std::max(0.0, left.square - edge.height * edge.height));
@@ -242,12 +243,13 @@ void add_corner_at_centre(Vec3 n, Disc& disc) {
 /// Adds the part of a face inside the ball, and returns it.
 Section add_face(const Disc& disc, Vec3 n, bool is_cut, double r, BallSums& sums) {
   BallPart& part = sums.part;
-  // A face that is nothing but rounding may seem to lie around anything.
+  // A face that is only rounding may seem to surround any point.
   const bool wide_enough = disc.touched || disc.whole >= 6 * disc.square;
   const bool whole_turn = disc.around && disc.square > 0 && wide_enough;
   if (!whole_turn && !disc.touched) return {};
   ++part.faces;
-  // Without an end on the sphere, edges are the whole border, and what they turn beside a whole turn is rounding.
+  // If no edge ends on the sphere, edges are the whole border. Their turn then differs from a whole turn only by
+  // rounding.
   const double h = disc.height, turn = whole_turn ? 2 * kPi : 0, rest = turn - disc.angle.value();
   const double arcs = disc.touched && disc.ends == 0 ? 0 : rest;
   if (!(arcs > -kOpen && arcs < 2 * kPi + kOpen)) part.error = kInfinity;
@@ -275,11 +277,11 @@ void finish(const std::vector<Disc>& discs, double r, BallSums& sums) {
   const double r2 = r * r, r3 = r * r2;
   sums.curved += DoubleDouble{sums.characteristic * 2.0} * kWidePi;
   const double area = r2 * sums.curved.value();
-  // A ball that no face reaches no plane reaches either, unless the polyhedron is nothing but rounding.
+  // If no face reaches the ball, no plane does either, unless the polyhedron is only rounding.
   const bool reached = std::ranges::any_of(discs, [](const Disc& disc) { return disc.square > 0; });
   if (part.faces == 0 && reached) part.error = kInfinity;
-  // The sphere beyond the faces is larger than the faces, and the curved part is larger than its area vector is long.
-  // After a wrong turn, one of the two would not hold.
+  // The rest of the sphere, beyond the faces, is larger than the faces. The area of the curved part is larger than the
+  // length of its area vector. A wrong turn would violate one of the two.
   const double slack = kOpen * r2;
   if (!(area + sums.flats <= 4 * kPi * r2 + slack && norm(part.flat) <= area + slack)) part.error = kInfinity;
   part.area += area;
@@ -292,31 +294,32 @@ void finish(const std::vector<Disc>& discs, double r, BallSums& sums) {
 
 }  // namespace
 
-// With heights h and areas A of the faces, and the area C of the curved part, all about the centre,
+// The faces have heights h and areas A, and the curved part has the area C. All are about the centre:
 //
 //   3 V = Σ h A + r C,   2 ∫ x dV = Σ n ∫ (|x|² − r²) dA over the faces,   ∫ n dA = −Σ A n over the curved part.
 //   2 ∫ x xᵀ dV + ∫ |x|² dV = r² V + Σ n ∫ (|x|² − r²) xᵀ dA.
 //
-// C is what the theorem of Gauss and Bonnet leaves: 2π times the curved part's Euler characteristic, less the turns at
-// its corners and those along its arcs, −h φ / r for an arc of angle φ. The characteristic is that of a sphere, 2, less
-// that of the faces' parts together: their number, less that of edges inside, and of corners inside, once more.
+// The theorem of Gauss and Bonnet gives C / r². It is 2π times the Euler characteristic of the curved part, minus the
+// turns of its border at corners and along arcs. The turn along an arc of angle φ is −h φ / r. The characteristic is 2,
+// that of a sphere, minus that of the union of the faces' parts. The latter is the number of these parts, minus the
+// number of edges inside, plus the number of corners inside.
 //
-// No decision parts these sums from each other: whether a corner is inside, what of an edge is, and on which side of an
-// edge a disc's middle lies are each decided once, for whatever depends on it. Decided wrongly by rounding, they are
-// right for a ball or a plane that is off by as much; so tangent planes and grazed edges need no care.
+// All sums share the same decisions. Whether a corner is inside, which part of an edge is inside, and on which side of
+// an edge a disc's middle lies are each decided once. If rounding makes a decision wrong, it is right for a ball or a
+// plane that is moved by the rounding. Tangent planes and grazed edges therefore need no special care.
 //
-// Where the ball's centre is itself a corner, it is seen from there as if it were a little farther along the edge that
-// leaves it: the middles of its faces' discs are outside.
+// If the ball's centre is itself a corner, the sums treat the corner as if it were a little farther along the edge that
+// leaves it. The middles of its faces' discs are then outside.
 //
-// The error. Every term has ten roundings or fewer, and sums that many terms make are rounded once: of the turns of a
-// fine polyhedron, all but the last digits cancel. An edge is where rounding has put it, to kPlacing of how far its
-// numbers reach, or as far as they were misplaced: seen along it, the two planes and their line still meet, so that
-// what it gives to the volume, a signed part of the ball between its planes and two of its disc's radii, changes by no
-// more than the parts of the discs that it cuts off, each a part of a sector. Where it ends in a corner inside, it is
-// seen from a disc's middle in a direction that is off by the corner's misplacement over its distance from there, and
-// with it a sector and what of the ball is above; without bound where a corner is in the middle of a disc, and edges
-// disagree upon where it is seen. Where it ends on the sphere, the turn there is of planes that it is parallel to, but
-// for what is measured.
+// Error. Every term has at most ten roundings. Sums of many terms are rounded once, because the turns of a fine
+// polyhedron cancel in all but their last digits. Rounding misplaces an edge by kPlacing times the reach of its
+// numbers, plus the misplacement of these numbers. Seen along the edge, the two planes and their line still meet. The
+// edge adds to the volume a signed part of the ball, between its planes and two radii of its discs. This part changes
+// by at most the parts of the discs that the edge cuts off, and each of these is part of a sector. If the edge ends in
+// a corner inside, a disc's middle sees the corner in a direction that is off. The error is the misplacement of the
+// corner over its distance. It changes a sector, and the part of the ball above the sector. If a corner is in the
+// middle of a disc, there is no bound, and edges disagree about this direction. If the edge ends on the sphere, the
+// turn there assumes planes parallel to the edge; the measured deviation counts as error.
 std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius) {
   thread_local std::vector<Disc> discs;
   thread_local std::vector<char> inside;

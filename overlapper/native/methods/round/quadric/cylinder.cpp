@@ -170,7 +170,7 @@ bool around(const AboutAxis& at, std::span<const int> ring, Vec3 n) {
     if (turn < 0) return false;
     twice += turn;
   }
-  // A face that is only rounding may seem to lie around anything.
+  // A face that is only rounding may seem to surround any point.
   return twice >= 6 * std::abs(n.z) * at.radius * at.radius;
 }
 
@@ -236,7 +236,7 @@ std::optional<double> arc_angle(Vec3 n, Vec3 p, Vec3 q, std::span<const Cylinder
   return std::abs(side) > 0.5 * radius * border * std::abs(n.z) && side > 0 ? angle + turn : angle;
 }
 
-/// The unit vector from the axis to the middle of an arc.
+/// The unit vector from the axis towards the middle of an arc.
 Vec3 way_to_middle(Vec3 p, Vec3 q, double angle) {
   const Vec3 sum{p.x + q.x, p.y + q.y, 0}, way{q.y - p.y, p.x - q.x, 0};
   if (dot2(sum, sum) > dot2(way, way)) return (std::abs(angle) < kPi ? 1 : -1) / std::sqrt(dot2(sum, sum)) * sum;
@@ -338,7 +338,7 @@ bool add_face(const AboutAxis& at, size_t f, std::vector<CylinderChord>& chords,
   return true;
 }
 
-/// Whether the sums are those of a closed surface. Its arcs turn forth as much as back, and its faces look up as much
+/// Whether the sums are those of a closed surface: its arcs turn forward as much as back, and its faces look up as much
 /// as down. Seen along the axis, faces that look up cover at most the disc once, but for rounding.
 bool closes(const CylinderSums& sums, double radius) {
   return std::abs(sums.turned) <= kOpen && std::abs(sums.part.curved.force.z) <= kOpen * sums.all_area &&
@@ -392,8 +392,8 @@ struct CylinderScratch {
 // terms.
 //
 // Second moments. For a coordinate x and a unit vector e orthogonal to the axis, the field (ρ² − r²) x e vanishes on
-// the curved part. The field z³ along the axis is tangent to it. By these fields, second moments are integrals over the
-// faces alone:
+// the curved part. The field z³ along the axis is tangent to the curved part. With these fields, second moments are
+// integrals over the faces alone:
 //
 //   4 ∫ ρ² dV = 2 r² V + Σ ∫ (ρ² − r²) (n_x x + n_y y) dA,   2 ∫ x² dV = r² V − ∫ ρ² dV + Σ n_x ∫ (ρ² − r²) x dA,
 //   3 ∫ z² dV = Σ n_z ∫ z³ dA,   2 ∫ x y dV = Σ n_x ∫ (ρ² − r²) y dA.

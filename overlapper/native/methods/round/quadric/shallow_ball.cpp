@@ -15,31 +15,33 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kUnit = 0x1p-53;  ///< of rounding
-constexpr double kOneWay = 1e-7;   ///< of how far ends are: so near each other, doubles do not say which way they are
-constexpr double kNear = 1e-9;     ///< of squares: so near the sphere, doubles do not say which side a corner is on
+constexpr double kOneWay = 1e-7;   ///< relative to the distances of two ends: if nearer, doubles give no direction
+constexpr double kNear = 1e-9;     ///< of squares: nearer to the sphere, doubles leave the side of a corner uncertain
 
-/// y z, z x and x y of two points, of one each.
+/// y z, z x and x y, with one factor from each point.
 Vec3 products(Vec3 a, Vec3 b) { return {a.y * b.z, a.z * b.x, a.x * b.y}; }
 
 }  // namespace
 
-// With heights h and areas A of the faces over the apex, its depth d in the ball, of radius r, and the height w that
-// the unit sphere has lost, where a normal n of it has the height 1 − w,
+// The faces have heights h over the apex and areas A. The apex has the depth d in the ball of radius r. A normal n of
+// the unit sphere has the height 1 − w, so w is the lost height.
 //
 //   3 V = Σ h A + r² (d S + (r − d) L),   S = ∫ dA = ∮ w dφ,   L = ∫ w dA = ½ ∮ w² dφ,   ∫ w² dA = ⅓ ∮ w³ dφ
 //
-// over the curved part of the unit sphere and along its border, where φ is the angle around the way to the apex: of a
-// part of the sphere, dA is dw dφ (Archimedes). With x² + y² = w (2 − w), dφ is (x dy − y dx) / (w (2 − w)), and all
-// that is integrated along an arc is a polynomial of x, y, w and their differentials over 2 − w. The other moments are
+// All integrals are over the curved part of the unit sphere, or along its border. φ is the angle around the direction
+// of the apex. On a sphere, dA is dw dφ (Archimedes). With x² + y² = w (2 − w), dφ is (x dy − y dx) / (w (2 − w)).
+// Every integrand along an arc is therefore a polynomial of x, y, w and their differentials, over 2 − w. The other
+// moments are
 //
 //   ∫ x wᵏ dA = ∮ wᵏ⁺¹ dy / (k + 1),   ∫ y wᵏ dA = −∮ wᵏ⁺¹ dx / (k + 1),   ∫ xy wᵏ dA = ∮ y wᵏ⁺¹ dy / (k + 1),
 //   ∫ (x² wᵏ + (1 − w) wᵏ⁺¹ / (k + 1)) dA = ∮ x wᵏ⁺¹ dy / (k + 1), and so for y.
 //
-// No term is larger than what is shared, but where the curved part does not hold the direction of the apex: nothing
+// No term is larger than the common set, unless the curved part does not contain the direction of the apex. Nothing
 // cancels.
 //
-// An arc's points are rational in the tangent of a quarter of its angle, which is cut to be at most that of 22.5°: the
-// nearest pole is at 2.4 times that, and Gauss's sixteen nodes are off by 5^-32 of what is integrated.
+// The points of an arc are rational functions of the tangent of a quarter of its angle. Arcs are cut so that this
+// tangent is at most that of 22.5°. The nearest pole is at 2.4 times this tangent. The relative error of Gauss's
+// sixteen nodes is therefore 5^-32.
 void ShallowBall::begin_face(Vec3 normal, double height, double disc_radius) {
   normal_ = normal, height_ = height, disc_radius_ = disc_radius;
   const double from_centre = radius_ - depth_, of_centre = height + from_centre * normal.z;
@@ -88,7 +90,7 @@ void ShallowBall::add_arc(Vec3 from, Vec3 to, Vec3 back) {
   if (angle <= tight) return integrate(middle, half * along, disc_radius_ * out, half / (disc_radius_ + to_chord));
   const int parts = static_cast<int>(std::ceil(angle / tight));
   const double part = angle / parts, s = std::sin(part), c = std::cos(part);
-  // The chord of an arc of more than half a turn may be too short to say where its own middle is.
+  // If an arc is longer than half a turn, its chord may be too short to give the direction of its middle.
   if (angle > 0.75 * kPi) out = -unit(from - disc_ + (to - disc_)), along = cross(normal_, out);
   for (int k = 0; k < parts; ++k) {
     const double at = (2 * k + 1 - parts) * part, sin_at = std::sin(at), cos_at = std::cos(at);
@@ -97,12 +99,13 @@ void ShallowBall::add_arc(Vec3 from, Vec3 to, Vec3 back) {
   }
 }
 
-/// An arc from middle − along to middle + along, of a circle whose radius towards the arc is `out`, and the tangent of
-/// a quarter of its angle.
+/// Adds the integrals along an arc of a circle, from middle − along to middle + along. `out` is the radius towards the
+/// arc, and `quarter` is the tangent of a quarter of its angle.
 void ShallowBall::integrate(Vec3 middle, Vec3 along, Vec3 out, double quarter) {
   const double scale = 1 / radius_, q2 = quarter * quarter;
   const double mx = scale * middle.x, my = scale * middle.y;
-  // Along the chord, the sine is 2 τ / (1 + τ²) over 2 q / (1 + q²) of half of it; across, 2 (q² − τ²) / ... of `out`.
+  // From the middle, a point of the arc is 2 τ / (1 + τ²) over 2 q / (1 + q²) times `along`, and 2 (q² − τ²) / ((1 +
+  // τ²) (1 + q²)) times `out`.
   const double widen = scale * (1 + q2), ax = widen * along.x, ay = widen * along.y;
   const double rise = 2 * scale * q2 / (1 + q2), bx = rise * out.x, by = rise * out.y;
   const double size = rise * std::sqrt(norm2(out));
@@ -110,7 +113,7 @@ void ShallowBall::integrate(Vec3 middle, Vec3 along, Vec3 out, double quarter) {
     for (const double node : {-kGaussNode[i], kGaussNode[i]}) {
       const double t2 = q2 * node * node, c = 1 / (1 + t2);
       const double go = node * c, bulge = (1 - node * node) * c;
-      // Backwards: what is to the left of a face's border is to the right of the curved part's.
+      // Backwards: a face is on the left of its border, and the curved part is on the right.
       const double go_rate = -kGaussWeight[i] * (1 - t2) * c * c,
                    bulge_rate = 2 * kGaussWeight[i] * (1 + q2) * node * c * c;
       const double x = mx + ax * go + bx * bulge, y = my + ay * go + by * bulge;
@@ -143,7 +146,7 @@ double ShallowBall::volume() const {
   return (cones_ + radius_ * radius_ * (depth_ * lost_[0] + (radius_ - depth_) * lost_[1])) / 3;
 }
 
-/// Terms have a score of roundings, of coordinates that are right to a few.
+/// Terms have about twenty roundings. Their coordinates have a few.
 double ShallowBall::error() const {
   constexpr double kRoundings = 64;
   return kRoundings * kUnit * (cone_sizes_ + radius_ * radius_ * (depth_ * area_sizes_ + radius_ * lost_sizes_)) / 3;
@@ -175,27 +178,27 @@ struct ShallowChord {
   int left, right;
   WideVector from, to;          ///< from the apex
   WideVector along;             ///< unit
-  bool from_sphere, to_sphere;  ///< whether that is where it enters or leaves, and not a corner
+  bool from_sphere, to_sphere;  ///< whether the end is on the sphere, and not a corner
 };
 
-/// The same in the axes of the apex.
+/// The same chord in the axes at the apex.
 struct SeenChord {
   Vec3 from, to, along;
 };
 
-/// An end of a chord on the sphere, as the arcs of a face see it.
+/// An end of a chord on the sphere, for the arcs of a face.
 struct ArcEnd {
   Vec3 at;
   int chord;
 };
 
-/// The face whose plane is the highest over the ball's centre, and how high that is.
+/// The face with the highest plane over the ball's centre, and the height of the plane.
 struct HighestFace {
   int face = 0;
   double over = -kInfinity;
 };
 
-/// Nothing if a plane leaves nothing of the ball, or if all planes hold its centre.
+/// No value if a plane leaves nothing of the ball, or if all planes have its centre inside.
 std::optional<HighestFace> highest_face(const Polyhedron& polyhedron, Vec3 centre, double radius) {
   HighestFace highest;
   for (int f = 0; f < static_cast<int>(polyhedron.planes.size()); ++f) {
@@ -206,15 +209,15 @@ std::optional<HighestFace> highest_face(const Polyhedron& polyhedron, Vec3 centr
   return highest.over > 0 ? std::optional(highest) : std::nullopt;
 }
 
-/// The polyhedron's nearest point to the centre, in doubles: any point near it is good, too.
+/// The polyhedron's nearest point to the centre, in doubles. Any point near it is good enough.
 struct NearestPoint {
-  bool above = true;  ///< it is in the highest face
-  int edge = -1;      ///< else it is on that edge
-  int corner = -1;    ///< the end of that edge that it is, if it is one
+  bool above = true;  ///< the point is in the highest face
+  int edge = -1;      ///< otherwise it is on this edge
+  int corner = -1;    ///< the end of the edge at which the point is, or -1
   double least2 = kInfinity;
 };
 
-/// Nothing if an edge has no length. Edges that may reach the ball are left in `reached`.
+/// No value if an edge has no length. `reached` gets the edges that may reach the ball.
 std::optional<NearestPoint> nearest_point(const Polyhedron& polyhedron, Vec3 centre, double radius, int highest,
                                           std::vector<int>& reached) {
   NearestPoint nearest;
@@ -256,7 +259,7 @@ struct WidePolyhedron {
 /// The point of a line that is nearest to the origin.
 WideVector foot_on(const WideVector& from, const WideVector& along) { return from - dot(from, along) * along; }
 
-/// The apex, from the centre of the ball. Nothing where corners miss the plane of the highest face.
+/// The apex, relative to the centre of the ball. No value if corners miss the plane of the highest face.
 std::optional<WideVector> apex_of(const WidePolyhedron& at, const NearestPoint& nearest, int highest) {
   if (nearest.above) {
     const auto top = at.places.plane(highest);
@@ -267,7 +270,7 @@ std::optional<WideVector> apex_of(const WidePolyhedron& at, const NearestPoint& 
   return foot_on(at.corner(edge.from), at.along(edge));
 }
 
-/// The part of an edge inside the ball, about the apex; nothing if there is none.
+/// The part of an edge inside the ball, about the apex. No value if there is none.
 std::optional<ShallowChord> chord_of(const Edge& edge, bool from_inside, bool to_inside, const WidePolyhedron& at,
                                      const WideVector& apex) {
   ShallowChord chord{edge.left,    edge.right, at.corner(edge.from), at.corner(edge.to), at.along(edge),
@@ -288,7 +291,7 @@ std::optional<ShallowChord> chord_of(const Edge& edge, bool from_inside, bool to
   return chord;
 }
 
-/// Which corners are inside is decided once for all their edges.
+/// Decides once for each corner whether it is inside, for all of its edges.
 void find_chords(const WidePolyhedron& at, std::span<const int> reached, const WideVector& apex,
                  std::vector<ShallowChord>& chords) {
   thread_local std::vector<signed char> known;
@@ -305,7 +308,8 @@ void find_chords(const WidePolyhedron& at, std::span<const int> reached, const W
   }
 }
 
-/// Axes at the apex, the first towards the farthest end of a chord: slender parts have the digits of their widths.
+/// Axes at the apex. The first axis points to the farthest end of a chord, so the width of a slender part has all
+/// digits.
 struct ApexAxes {
   WideVector ahead, aside, up;
 
@@ -344,7 +348,7 @@ struct FaceBorder {
     }
   }
 
-  /// The next of the ends where edges enter, counter-clockwise.
+  /// The next end at which an edge enters, counter-clockwise.
   const ArcEnd& next(const ArcEnd& leave, Vec3 middle) const {
     const ArcEnd* next = &enters[0];
     double first = kInfinity;
@@ -358,7 +362,7 @@ struct FaceBorder {
     return *next;
   }
 
-  /// The unit vector from the begin of an arc to its end; nothing where doubles do not say which way round it goes.
+  /// The unit vector from the begin of an arc to its end. No value if doubles leave the direction of the arc uncertain.
   std::optional<Vec3> back(const ArcEnd& leave, const ArcEnd& enter) const {
     if (enter.chord == leave.chord) {
       const Vec3 along = seen[leave.chord].along;
@@ -370,7 +374,7 @@ struct FaceBorder {
     return between / length;
   }
 
-  /// False where doubles leave open which way round an arc goes.
+  /// False if doubles leave the direction of an arc uncertain.
   bool add_arcs(ShallowBall& ball) const {
     if (leaves.size() != enters.size()) return false;
     for (const ArcEnd& leave : leaves) {
@@ -390,13 +394,14 @@ struct FaceBorder {
   }
 };
 
-/// A face that no edge parts is whole, or nothing: it is nothing if the middle of its disc is above the apex.
+/// If no edge cuts the disc of a face, the face is the whole disc or empty. It is empty if the disc's middle is above
+/// the apex.
 bool is_whole(const Plane& face, Vec3 centre, double radius, Vec3 up, double apex_distance) {
   const double height = -signed_distance(face, centre);
   return height < radius && height * dot(face.normal, up) >= (1 - kNear) * apex_distance;
 }
 
-/// Adds a face that edges part. False where that leaves a decision open.
+/// Adds a face whose disc is cut by edges. False if a decision is uncertain.
 bool add_face(int f, const WidePolyhedron& at, const WideVector& apex, const ApexAxes& axes,
               std::span<const ShallowChord> chords, std::span<const SeenChord> seen, ShallowBall& ball,
               ShallowPart& part, Section& section) {
@@ -421,7 +426,7 @@ bool add_face(int f, const WidePolyhedron& at, const WideVector& apex, const Ape
   return true;
 }
 
-/// All faces and the curved part, seen from the apex at `distance` from the centre.
+/// All faces and the curved part. The apex has the given `distance` from the centre.
 std::optional<ShallowPart> measure_from(const WideVector& apex, const WidePolyhedron& at,
                                         std::span<const int> reached) {
   thread_local std::vector<ShallowChord> chords;

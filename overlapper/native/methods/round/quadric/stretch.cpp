@@ -30,7 +30,7 @@ struct Integral {
   double value = 0, error = 0;
 };
 
-/// Halves the interval until the two rules agree to a fraction of the value there, or of the whole.
+/// Halves the interval until the difference of the two rules is a small fraction of the value there, or of the whole.
 template <class Integrand>
 Integral integrate(const Integrand& integrand, double low, double high, double whole, int halvings = 0) {
   const double middle = low + (high - low) / 2, half = (high - low) / 2;
@@ -59,8 +59,8 @@ double Stretch::arc(Vec3 level, Vec3 across, Vec3 along, double half_angle) cons
   for (int i = 0; i < parts; ++i) {
     const double angle = (2 * i + 1 - parts) * step, cosine = std::cos(angle), sine = std::sin(angle);
     const Vec3 out = cosine * b + sine * c, on = cosine * c - sine * b;
-    // The variable is s = tan(angle / 2). No sine is needed. The polynomial under the root has its complex zeros as far
-    // from the arc as they are on the circle.
+    // The variable is s = tan(angle / 2), so that no sine is needed. The complex zeros of the polynomial under the root
+    // are then as far from the arc as on the circle.
     const auto element = [&](double s) {
       const double square = s * s, inverse = 1 / (1 + square);
       const Vec3 at = (1 + square) * a + (1 - square) * out + (2 * s) * on;

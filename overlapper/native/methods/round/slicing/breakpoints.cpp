@@ -329,7 +329,7 @@ class Candidates {
   std::array<Sides, kSamples / kRow> sides_;
 };
 
-/// Halves the interval up to the last bit. `before(t)` is true if t lies before the change that is looked for.
+/// Halves the interval down to the last bit. `before(t)` is true if t lies before the wanted change.
 template <class Before>
 void halve(double& low, double& high, Before before) {
   for (int step = 0; step < 60; ++step) {
@@ -399,7 +399,7 @@ class Settling {
     if (between.empty()) return;
     // Only rounding leaves an empty slice between others: the set is convex.
     if (!intervals_.empty()) intervals_.back().high = low;
-    // A corner and a circle, or three lines, meet at one value of t. Rounding may make an interval of that value.
+    // A corner and a circle, or three lines, meet at one value of t. Rounding may turn this value into an interval.
     const double far = std::max({0.0, low_, -high_});
     const double pointlike =
         std::max((closely_ ? kPointlikeClosely : kPointlike) * size_near(low, high), kRounded * far);

@@ -17,7 +17,7 @@ struct Points {
 
 double sum(const Row& row) { return ((row[0] + row[1]) + (row[2] + row[3])) + ((row[4] + row[5]) + (row[6] + row[7])); }
 
-/// Rounding of its ends makes most of the direction of a shorter chord, relative to the radius.
+/// A shorter chord, relative to the radius, has a direction that is mostly the rounding of its ends.
 constexpr double kShort = 1e-6;
 
 /// quadric::Segment of each slice.
@@ -87,8 +87,8 @@ class Bundle {
     }
   }
 
-  /// The points where a line enters the disc and leaves it. If rounding has put the line outside the disc, both are the
-  /// tangent point.
+  /// The points where a line enters the disc and leaves it. If rounding has put the line outside the disc, both points
+  /// are the tangent point.
   void crossings(const Line& line, Points& enter, Points& leave) const {
     const Point u = (1 / line.length) * line.normal;
     const double length = line.length;
@@ -243,7 +243,7 @@ class Bundle {
     }
   }
 
-  /// Adds edges to the view, each as long as it looks.
+  /// Adds edges to the view, with their visible lengths.
   void see(const Points& from, const Points& to, const Row& length) {
     const View& view = *stack_.view;
     for (int k = 0; k < kRow; ++k) {
@@ -268,7 +268,7 @@ class Bundle {
   void find_chords(const Points& p, const Points& q, int before, int after, Chords& chords) const {
     auto& [length, distance, ax, ay, angle, sine, cosine] = chords;
     const Row& radius = sides_.half[stack_.ball];
-    // If two lines leave nearly all of the disc, the arc between them is nearly all of the circle or next to nothing.
+    // If two lines leave nearly all of the disc, the arc between them is nearly all of the circle or nearly empty.
     // It is nearly all only if the lines are one line, or turn back.
     const bool back = slicing::cross(stack_.line[before].normal, stack_.line[after].normal) <= 0;
     Row one, two;
@@ -279,7 +279,7 @@ class Bundle {
       const double inverse = l > 0 ? 1 / l : 0, x = cy * inverse, y = -cx * inverse;
       const double beside =
           x * (0.5 * (p.x[k] + q.x[k]) - sides_.centre_x[k]) + y * (0.5 * (p.y[k] + q.y[k]) - sides_.centre_y[k]);
-      // Rounding may have reversed a short chord. The two lines beside the chord then tell the side.
+      // Rounding may have reversed a short chord. The two lines beside the chord then decide the side.
       const double sure = back && one[k] > 0 && two[k] > 0 ? -std::abs(beside) : std::abs(beside);
       const double d = l < kShort * radius[k] ? sure : beside, h = 0.5 * l;
       const double whole = std::max(std::sqrt(h * h + d * d), DBL_MIN);
@@ -288,7 +288,7 @@ class Bundle {
       angle[k] = half_turn_angle(h / whole, d / whole);
     }
     for (int k = 0; k < kRow; ++k) shortest = std::min(shortest, length[k] - kShort * radius[k]);
-    // If a chord is only rounding, the way from the centre is the direction across it.
+    // If a chord is only rounding, the direction across it is the direction from the centre.
     for (int k = 0; shortest < 0 && k < kRow; ++k) {
       if (!(length[k] < kShort * radius[k])) continue;
       const Point away =
@@ -420,8 +420,8 @@ class Bundle {
     sum_.products += Vec3{sum(yz), sum(zx), sum(xy)};
   }
 
-  /// atan2(sine, cosine) for a sine that is not negative: the rational approximation of Cephes for half the angle. It
-  /// has no branches.
+  /// atan2(sine, cosine) for a sine that is not negative: the rational approximation of Cephes for half the angle,
+  /// without branches.
   static double half_turn_angle(double sine, double cosine) {
     const double tangent = sine / (1 + std::abs(cosine));
     const bool large = tangent > 0.66;

@@ -30,9 +30,9 @@ constexpr double kVolumeTail = 2e-9, kAreaTail = 1e-7;
 constexpr double kHopeless = 30;
 static_assert(kHopeless > kMostNodes);
 constexpr int kMostHalvings = 48;
-/// Rules after which halving goes on for ever: where two surfaces touch along a line.
+/// The largest number of rules. Without it, halving would never end where two surfaces touch along a line.
 constexpr int kMostRules = 600;
-/// Rules after which the area of a stretched ball, whose element may change as sharply as at an edge, has its error.
+/// After so many rules, the area of a stretched ball keeps its error. Its element may change as sharply as at an edge.
 constexpr int kMostRulesForStretch = 240;
 
 /// The answer of a rule for the slices between two values of t.
@@ -92,9 +92,9 @@ class Integrating {
  private:
   Rule first() const { return few_ ? kRules.front() : kRules.back(); }
 
-  /// How many times half of its nodes a rule lacks.
+  /// The number of missing nodes of a rule, in halves of its present number.
   double lacks(const RulePart& part) const {
-    // No rule makes rounding smaller.
+    // A finer rule does not reduce rounding.
     const double rounding = 16 * DBL_EPSILON * part.integrals.blur / part.integrals.volume;
     const auto of = [&](const Series& series, double here, double whole, double limit, double limit_of_tail) {
       const double end = series.tail();
@@ -141,7 +141,7 @@ class Integrating {
   void add_as_it_is(const RulePart& part) {
     sum_.integrals.add(1, part.integrals);
     sum_.samples.insert(sum_.samples.end(), part.samples.begin(), part.samples.begin() + 2 * part.rule.size());
-    // If halving for the area has ended, terms are not taken to fall further.
+    // If halving for the area has ended, terms count as falling no further.
     const bool ended = sum_.rules > kMostRulesForStretch;
     const double of_stretched = ended ? 30 * part.area.tail() : part.area.stretched_error(part.integrals.area);
     sum_.area_error += stack_.stretch ? of_stretched : part.area.error();

@@ -69,8 +69,9 @@ bool of_one_direction(Point a, Point b) {
   return dot(a, b) > 0 && std::abs(one - two) <= 32 * DBL_EPSILON * (std::abs(one) + std::abs(two));
 }
 
-/// Whether two lines run in one direction, so that their crossing is only rounding. It may then be anywhere on the
-/// lines. Or it lies outside the edge from p to q, although p and q are on different sides of the other line.
+/// Whether two lines run in one direction, so that their crossing is only rounding. The crossing may then be anywhere
+/// on the lines. It may also lie outside the edge from p to q, although p and q are on different sides of the other
+/// line.
 bool along_one_another(const Slice& slice, int edge, int other, Point p, Point q) {
   const Point a = slice.stack.line[edge].normal, b = slice.stack.line[other].normal;
   if (!(std::abs(cross(a, b)) <= 32 * DBL_EPSILON * dot(a, b))) return false;
@@ -128,7 +129,8 @@ bool clip(Polygon*& now, Polygon*& spare_one, const Slice& slice, int line) {
   if (count == size) return true;
   if (count == 0) return false;
   const auto wrapped = [size](int i) { return i < size ? i : i - size; };
-  // Of two lines in one direction only the nearer one counts. The corners of the other one may be wrong by rounding.
+  // If two lines run in one direction, only the nearer line counts. Rounding may misplace the corners of the other
+  // line.
   const auto farther = [&](int edge) {
     return slice.side(edge) * stack.line[line].length > side * stack.line[edge].length;
   };
@@ -158,9 +160,9 @@ constexpr double kBesideCircle = 1e-6;
 /// Chords that meet no edge are not enough: in a polygon that is only rounding, none does.
 constexpr double kBeyondCircle = 0.999;
 
-/// Joins edges that do not share a corner by arcs. Both edges at a corner have the corner inside the circle, or neither
-/// has. At a corner the outline turns by less than half a turn. If either is not so, the polygon is only rounding, and
-/// the outline becomes empty. `position` has the numbers of edges among the `long_edges` of the polygon. `before` and
+/// Joins edges that do not share a corner by arcs. A corner must be inside the circle for both of its edges or for
+/// neither. At a corner the outline turns by less than half a turn. Otherwise the polygon is only rounding, and the
+/// outline becomes empty. `position` has the numbers of edges among the `long_edges` of the polygon. `before` and
 /// `after` are the fractions of an edge's chord outside the edge.
 void close_with_arcs(const Slice& slice, std::span<const int> position, int long_edges, std::span<const double> before,
                      std::span<const double> after, Outline& result) {
@@ -205,8 +207,8 @@ void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
   close_with_arcs(slice, std::span(position).first(result.edges), long_edges, before, after, result);
 }
 
-/// Whether two neighbouring lines run against each other and meet beyond the square around everything. Only rounding is
-/// then between them.
+/// Whether two neighbouring lines have opposite directions and meet beyond the square around everything. Only rounding
+/// is then between them.
 bool is_flat(const Polygon& polygon, const Slice& slice) {
   constexpr double kParallel = 1e-12;
   const Stack& stack = slice.stack;

@@ -22,7 +22,7 @@ inline double dot(Point a, Point b) { return a.x * b.x + a.y * b.y; }
 inline double norm(Point a) { return std::sqrt(dot(a, a)); }
 inline double cross(Point a, Point b) { return a.x * b.y - a.y * b.x; }
 
-/// The largest number of lines around a slice. Bodies with more planes, where no cut leaves fewer, have another way.
+/// The largest number of lines around a slice. Bodies with more planes, even after cuts, are measured in another way.
 inline constexpr int kMostLines = 72;
 
 /// A quadric in coordinates (x, y, t) about a point of the common set: a ball, or a cylinder with its axis in the
@@ -39,14 +39,14 @@ struct Quadric {
   double slack = 0;                      ///< |centre|² − radius²: not positive if the origin is inside
   double low = 0, high = 0;              ///< slices exist between these values of t
   double level = 0;                      ///< t of its centre
-  static constexpr double kPole = 1e-6;  ///< relative to the terms: a squared side as accurate by a difference
+  static constexpr double kPole = 1e-6;  ///< squared side over the terms: below it, a difference is as accurate
 
   double half_chord2(double t) const { return (t - low) * (high - t); }
   /// The part of value() that does not depend on x and y, and the size of its terms.
   double constant(double t) const { return (1 + dot(shear, shear)) * t * t - 2 * along * t + slack; }
   double terms(double t) const { return (1 + dot(shear, shear)) * t * t + std::abs(2 * along * t) + std::abs(slack); }
-  /// The root of y² − 2 middle y + constant nearer to zero, from the other root, without a difference. Near an end of
-  /// the quadric, where the root is smaller than the rounding of the constant, it is a difference.
+  /// The root of y² − 2 middle y + constant that is nearer to zero, from the other root, without a difference. Near an
+  /// end of the quadric, this root is smaller than the rounding of the constant, and a difference gives it.
   double nearer(double far, double middle, double constant, double t) const {
     return far * far > kPole * terms(t) ? constant / far : 2 * middle - far;
   }
@@ -104,7 +104,7 @@ struct LineCorner {
 /// A surface seen along a direction, in coordinates u and v across it.
 struct View {
   int owner = 0;      ///< of the surface
-  bool rest = false;  ///< shows all other surfaces from behind instead; if the owner has arcs, these have none
+  bool rest = false;  ///< shows all other surfaces from behind instead; these have no arcs if the owner has arcs
   double u0 = 0, v0 = 0;
   Vec3 u, v;    ///< gradients of u and v along x, y and t
   Vec3 normal;  ///< against the direction, along l, m and n
@@ -183,7 +183,7 @@ struct Outline {
 };
 Outline outline(const Slice& slice);
 
-/// Whether a slice certainly has that outline; faster than finding the outline.
+/// Whether a slice certainly has the given outline. This is faster than finding the outline.
 bool is_outline(const Slice& slice, const Outline& outline);
 
 /// Integrals over a slice, or over slices, in coordinates x, y and t: of the volume and of the surfaces.
@@ -192,7 +192,7 @@ struct Integrals : Moments {
   double first_area = 0;  ///< the first body's part of `area`
   /// ∫ N dA and ∫ X × N dA along l, m and n: for each body's surface, and for the cuts through bodies.
   std::array<Vec3, 3> pull{}, moment{};
-  double across = 0;             ///< ∫ t N dA along n over all of the surface: the volume, by other integrals
+  double across = 0;             ///< ∫ t N dA along n over all of the surface: equal to the volume
   double terms = 0;              ///< the size of the terms of `across`
   double border = 0;             ///< ∫ dA over all of the surface
   double correction = 0;         ///< of the volume: first-order effect of the tails of planes

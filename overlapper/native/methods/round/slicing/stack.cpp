@@ -8,19 +8,19 @@ namespace {
 
 /// Two axes are one direction for double-doubles if the sine between them is not larger.
 constexpr double kOneDirection = 1e-24;
-/// The sine of a plane's tilt against the slices up to which the plane ends the stack. The tilt counts to first order.
+/// A plane ends the stack if the sine of its tilt against the slices is not larger. The tilt counts to first order.
 constexpr double kParallel = 1e-11;
 /// The border of a plane with a tilt between kParallel and kRushing would move too fast from slice to slice.
 constexpr double kRushing = 1e-3;
-/// A ridge whose direction has a smaller component across the slices counts as parallel to them.
+/// A ridge with a smaller component across the slices counts as parallel to the slices.
 constexpr double kSteep = 0.05;
-/// Where the way out of the walls is that much shorter than out of the round, slices are strips along a wall. In axes
-/// along the wall, the width of the strips has all digits.
+/// If the distance to the walls is shorter than the distance to the round by this factor, slices are strips along a
+/// wall. In axes along the wall, the width of the strips has all digits.
 constexpr double kThin = 1e-3;
-/// Tangents of the angles by which slices are turned, until some suit.
+/// Tangents of the angles by which slices are turned, in the order of trial.
 constexpr std::array<double, kAxes> kTurns{0, 0.3, -0.3, 0.7, -0.7};
 
-/// Axes of the slices: l, m and n orthonormal, t = n + x l + y m for the shear (x, y).
+/// Axes of the slices: l, m and n are orthonormal, and t = n + x l + y m for the shear (x, y).
 struct Axes {
   WideVector l, m, n, t;
   DoubleDouble x{}, y{};
@@ -92,7 +92,7 @@ Axes turned(const WideVector& l, const WideVector& m0, double tangent_of_angle, 
   return sheared(l, m, n, !thin && std::abs(rounded(dot(ridge, n))) > kSteep ? ridge : n0);
 }
 
-/// The same slices, with m across the strips that a wall makes of them.
+/// The same slices, with m across the strips that the slices form along a wall.
 Axes along_strips(const Axes& axes, const WideVector& normal) {
   const WideVector flat = across(normal, axes.n);
   if (!(norm2(rounded(flat)) > kSteep * kSteep)) return axes;
@@ -117,7 +117,7 @@ Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double t
       const WideVector m = unit(flat), l = cross(m, n);
       WideVector along = n;
       const WideVector ridge = cross(out, ways[1].normal);
-      // If the way out is nearly across the slices, the slices are as wide as the common set.
+      // If the shortest way out is nearly across the slices, the slices are as wide as the common set.
       if (std::abs(rounded(dot(ridge, n))) > kSteep) along = ridge;
       else if (width > 8 * std::sqrt(std::max(0.0, 2 * ways[0].slack / radius))) along = across(n, out);
       return sheared(l, m, n, along);
@@ -154,8 +154,8 @@ bool even(const Axes& axes, std::span<const Wall> walls) {
   });
 }
 
-/// The axes number `way` among the turns that suit. If none suits, number 0 is the first turn. The slices of two
-/// cylinders whose axes are not parallel cannot be turned.
+/// The axes number `way` among the suitable turns. If no turn is suitable, number 0 is the first turn. The slices of
+/// two cylinders whose axes are not parallel cannot be turned.
 std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall> walls, int way) {
   const Axes first = choose(rounds, walls, 0);
   const bool fixed = rounds.size() == 2 && !rounds[0].ball && !rounds[1].ball &&
@@ -169,8 +169,8 @@ std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall>
   return way == 0 ? std::optional(first) : std::nullopt;
 }
 
-/// The component of a unit vector along another one; 0 if it is only the rounding of double-doubles. That rounding
-/// would make parallel lines cross.
+/// The component of a unit vector along another one. It is 0 if it is only the rounding of double-doubles, because such
+/// rounding would make parallel lines cross.
 DoubleDouble along(const WideVector& unit, const WideVector& axis) {
   const DoubleDouble component = dot(unit, axis);
   return std::abs(component.head) > 1e-30 ? component : DoubleDouble{};

@@ -15,8 +15,8 @@ bool holds_to(const Stack& stack, double t, double end) {
 
 bool ended_by(const std::optional<Line>& plane, double t) { return plane && plane->offset / plane->rate == t; }
 
-/// Adds the face at one end: the lower one for `side` -1. A plane that ends the stack has such a face. So has the end
-/// of a quadric that slices are drawn out to; that face is as thin as rounding.
+/// Adds the face at one end: the lower one for `side` -1. If a plane ends the stack, there is such a face. If slices
+/// are extended to the end of a quadric, there is also a face, as thin as rounding.
 void add_end_face(const Stack& stack, const std::optional<Line>& plane, double end, int side, int drawn_to, double t,
                   const Outline& of_last, bool few, Integrals& sum) {
   if (plane && t == end) {
