@@ -36,7 +36,7 @@ struct SlicedPair {
 };
 
 /// Both bodies are cut into pieces: the parts of a ball or a cylinder, or of no round shape, within planes. Slices are
-/// orthogonal to the axes of cylinders. They are convex polygons cut by at most one disc. Quadrature integrates over
+/// parallel to the axes of cylinders. They are convex polygons cut by at most one disc. Quadrature integrates over
 /// intervals between the values at which the outline of slices changes. No term is negative, so nothing cancels. All
 /// numbers are distances from the inner point, computed in double-double. A contact of any depth is therefore measured
 /// to the same relative accuracy. Compare Strobl, Formella and Pöschel (2016), who integrate a ball over a tetrahedron
