@@ -367,8 +367,7 @@ polytope contains the common set, as closely as `tolerance` asks.)");
         return nb::tuple(list);
       },
       nb::sig("def shapes(self) -> tuple[Placed, ...]"), "The bodies in the order given.");
-  cls.def_prop_ro("tolerance", &Overlap::tolerance,
-                  "Allowed relative error of the volume for curved shapes.");
+  cls.def_prop_ro("tolerance", &Overlap::tolerance, "Allowed relative error of the volume for curved shapes.");
   cls.def_prop_ro(
       "converged", [](const Overlap& o) { return measured(o).converged(); },
       R"(False if the volume may be off by more than the fraction `tolerance`: where rounding, or the most planes that a
