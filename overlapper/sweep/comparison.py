@@ -24,7 +24,7 @@ from overlapper.sweep.measures import LEFT_OUT
 from overlapper.sweep.part import FAILURES, OF, TASK, TASKS, arrow
 from overlapper.sweep.store import Names, Store, content, names_of
 from overlapper.sweep.sweep import Numbers, Sweep
-from overlapper.tables.table_file import read_metadata
+from overlapper.tables.table_file import read_metadata, read_parquet
 from overlapper.verdicts.expected import FORCES, ROUNDING, Budget, budgets_in
 
 Values = NDArray[np.float64]
@@ -215,7 +215,7 @@ class Recorded:
         """The given columns of a part, without those that it does not have."""
         with self._opened(path) as file:
             try:
-                return file.read(columns=[*columns], use_threads=False)  # see store.content
+                return read_parquet(file, columns)
             except (arrow().ArrowException, OSError) as error:
                 raise self._unreadable(path, error) from error
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from overlapper.install import hint
 from overlapper.printable import first_line
 from overlapper.sweep.part import FAILURES, OF_TASKS, STEPS, STEPS_PART, TASK, TASKS, arrow, digest, parts
+from overlapper.tables.table_file import read_parquet
 from overlapper.whole_file import beside
 
 Names = NDArray[np.bytes_]  # of tasks, 16 bytes each
@@ -70,8 +71,7 @@ def content(path: Path, columns: Sequence[str] | None = None) -> Any:
     data = _must_be_whole(path)
     try:
         file = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(data), page_checksum_verification=True)
-        # Without threads: a thread that Arrow has just started may abort a process that is ending.
-        return file.read(columns=columns, use_threads=False)
+        return read_parquet(file, columns)
     except (pyarrow.ArrowException, OSError) as error:
         raise Broken(path, f"cannot be read: {first_line(error)}") from error
 

@@ -494,6 +494,14 @@ def _arrow() -> Any:
     return pyarrow
 
 
+def read_parquet(file: Any, columns: Sequence[str] | None = None) -> Any:
+    """Return the Arrow table in an open Parquet file, or those columns of it.
+
+    No thread of Arrow reads it. A thread that has just started may abort a process that ends.
+    """
+    return file.read(columns=columns if columns is None else [*columns], use_threads=False)
+
+
 def read_metadata(path: Path) -> dict[str, str]:
     """Return the metadata of a table by name: the versions and the settings that wrote it.
 
@@ -527,8 +535,7 @@ def read_table(path: Path) -> list[Row]:
     if path.suffix == ".parquet":
         with _opened_parquet(path) as dataset:
             _check_columns(path, dataset.schema.names)
-            # Without threads: one that Arrow has just started may abort a process that ends.
-            rows = [_checked(row) for row in dataset.read(use_threads=False).to_pylist()]
+            rows = [_checked(row) for row in read_parquet(dataset).to_pylist()]
             return _sealed(path, _texts(dataset.schema.metadata), dataset.schema.names, rows)
     if path.suffix == ".sqlite":
         with _opened_sqlite(path) as connection:
