@@ -72,6 +72,7 @@ class Part {
     const DoubleDouble r{at.r}, s{at.s};
     power_ = (at.distance - r) * (at.distance + r) + s * s;
     if (end) power_ = power_ + level * level;
+    per_twice_distance_ = DoubleDouble{1} / (DoubleDouble{2} * at.distance);
     find_roots();
   }
 
@@ -204,7 +205,7 @@ class Part {
     lens.half = std::sqrt(std::max(0.0, discs.chord2)) / (2 * d_);
     // The two heights are differences of numbers that may be much larger.
     const DoubleDouble slope = DoubleDouble{end_ ? 2.0 : 1.0} * (end_ ? level_ : discs.at);
-    const DoubleDouble to_ball = (power_ - slope * discs.at) / (DoubleDouble{2} * at_.distance);
+    const DoubleDouble to_ball = (power_ - slope * discs.at) * per_twice_distance_;
     lens.to_ball = to_ball.head, lens.to_body = (at_.distance - to_ball).head;
     lens.of_body = std::atan2(lens.half, lens.to_body), lens.of_ball = std::atan2(lens.half, lens.to_ball);
     const double r2 = discs.of_body2, s2 = discs.of_ball2, r = std::sqrt(r2), s = std::sqrt(s2);
@@ -272,6 +273,7 @@ class Part {
   int roots_ = 0;
   double lead_ = 1, beside2_ = 0;
   DoubleDouble power_;  ///< the chord's height below the ball's centre times twice the distance, where z is 0
+  DoubleDouble per_twice_distance_;
 };
 
 DoubleDouble least(DoubleDouble a, DoubleDouble b) { return a < b ? a : b; }

@@ -136,10 +136,8 @@ struct FewPieces {
  private:
   bool add(int i, int j, const PieceSetting& setting, Sums& sums) {
     both.get_rounds(i, j, rounds);
-    walls.clear();
-    const Piece &p = both.a.pieces[i], &q = both.b.pieces[j];
-    walls.insert(walls.end(), both.a.walls.begin() + p.first_wall, both.a.walls.begin() + p.first_wall + p.walls);
-    walls.insert(walls.end(), both.b.walls.begin() + q.first_wall, both.b.walls.begin() + q.first_wall + q.walls);
+    const std::span<const Wall> of_a = both.a.of(i), of_b = both.b.of(j);
+    walls.assign(of_a.begin(), of_a.end()), walls.insert(walls.end(), of_b.begin(), of_b.end());
     return add_piece(rounds, walls, nullptr, setting, sums);
   }
 };

@@ -149,6 +149,8 @@ bool on_facet(std::span<const Wall> prism, const Wall& of_core, size_t sides) {
          prism[1].owner != slicing::kCut && same(prism[1].normal, of_core.normal);
 }
 
+/// Replaces all pieces by a flat one with the walls `first` and, if there are walls `second`, by one of the round. The
+/// lists hold copies, so they may come from the pieces.
 void become(Pieces& result, std::initializer_list<Wall> first, std::initializer_list<Wall> second) {
   result.walls.assign(first), result.walls.insert(result.walls.end(), second);
   result.pieces = {{-1, 0, static_cast<int>(first.size())}};
@@ -159,18 +161,18 @@ void join_facet(Pieces& pieces) {
   const std::span<const Wall> core = pieces.of(0), prism = pieces.of(1);
   if (!pieces.rounds.empty() || core.size() != 1 || core[0].owner != slicing::kCut || !on_facet(prism, core[0], 0))
     return;
-  become(pieces, {Wall(prism[1])}, {});
+  become(pieces, {prism[1]}, {});
 }
 
 void join_edge(Pieces& pieces) {
-  constexpr double kLeastTurn = 1e-3, kMostTurn = 1.98;  // of one normal to the other: the length of their difference
+  constexpr double kLeastTurn = 1e-3, kMostTurn = 1.98;  // lengths of the difference of the two normals
   const std::span<const Wall> core = pieces.of(0), first = pieces.of(1), second = pieces.of(2), wedge = pieces.of(3);
   if (pieces.rounds.size() != 1 || pieces.rounds[0].ball || pieces.pieces[3].round != 0) return;
   if (core.size() != 2 || wedge.size() != 2 || !on_facet(first, core[0], 1) || !on_facet(second, core[1], 1)) return;
   const WideVector &of_first = first[2].normal, &of_second = second[2].normal;
   const bool in_order = same(wedge[0].normal, -of_first) && same(wedge[1].normal, -of_second);
   if (!in_order && !(same(wedge[1].normal, -of_first) && same(wedge[0].normal, -of_second))) return;
-  const Wall one = first[1], other = second[1];
+  const Wall &one = first[1], &other = second[1];
   const double turn = norm(overlapper::rounded(one.normal - other.normal));
   if (!(turn > kLeastTurn && turn < kMostTurn)) return;
   const Round& round = pieces.rounds[0];

@@ -27,6 +27,7 @@ struct Pieces {
   double flatness = 0;  ///< m: largest distance of a facet's plane from its corners
   double rounding = 0;  ///< m: movement of surfaces by the rounding of double-doubles
 
+  /// The walls of a piece.
   std::span<const Wall> of(int piece) const {
     return std::span(walls).subspan(pieces[piece].first_wall, pieces[piece].walls);
   }
