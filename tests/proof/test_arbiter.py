@@ -122,9 +122,9 @@ def test_a_plate_whose_faces_no_first_direction_meets_is_settled():
 
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize(("shift", "distance"), [((0, 0, 0), 0.0), ((0, 0, 0.3), 0.3), ((3, 0, 4), np.hypot(1, 4))])
-def test_plates_thinner_than_rounding_are_treated_as_flat(shift, distance, turned):
+def test_plates_as_thin_as_rounding_are_treated_as_flat(shift, distance, turned):
     q = quaternion(np.random.default_rng(6)) if turned else (0, 0, 0, 1)
-    plate = moved(Placed(Box([1.0, 1.0, 1e-16])), orientation=q)
+    plate = moved(Placed(Box([1.0, 1.0, 1.1e-15])), orientation=q)
     lower, upper = signed_distance_bounds(plate, moved(moved(Placed(plate.shape), shift), orientation=q))
     assert distance - 1e-14 < lower <= upper < distance + 1e-14
 

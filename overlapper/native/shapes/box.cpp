@@ -90,6 +90,8 @@ std::vector<Vec3> corners_along_axes(Vec3 h) {
 
 Box Box::make(Vec3 half_extents) {
   for (int i = 0; i < 3; ++i) require_size(half_extents[i], "half_extents");
+  require_ratio(std::min({half_extents.x, half_extents.y, half_extents.z}), max_component(half_extents),
+                "half_extents");
   return Box(half_extents);
 }
 

@@ -16,6 +16,7 @@ Capsule Capsule::make(double radius, double length) {
   require(std::isfinite(length), "length must be finite");
   require(length >= 0, "length must not be negative, it is " + std::to_string(length));
   require(length < kLargest, "length must be less than 1e25 m");
+  require_ratio(radius, length, "radius and length");
   return {radius, length};
 }
 

@@ -1,5 +1,6 @@
 #include "shapes/cylinder.h"
 
+#include <algorithm>
 #include <numbers>
 
 #include "shapes/cutter.h"
@@ -13,6 +14,7 @@ using namespace tangents;
 Cylinder Cylinder::make(double radius, double length) {
   require_size(radius, "radius");
   require_size(length, "length");
+  require_ratio(std::min(radius, length), std::max(radius, length), "radius and length");
   return {radius, length};
 }
 

@@ -113,6 +113,7 @@ struct ScaledPoint {
 
 Ellipsoid Ellipsoid::make(Vec3 half_axes) {
   for (int i = 0; i < 3; ++i) require_size(half_axes[i], "half_axes");
+  require_ratio(half_axes[shortest_axis(half_axes)], max_component(half_axes), "half_axes");
   return Ellipsoid(half_axes);
 }
 

@@ -22,4 +22,12 @@ inline void require_size(double value, const char* name) {
   require(value > kSmallest && value < kLargest, std::string(name) + " must be between 1e-25 and 1e25 m");
 }
 
+/// The largest ratio of two lengths of a shape. A thinner body is lost in the rounding of its own size.
+inline constexpr double kLargestRatio = 1e15;
+
+/// Throws std::invalid_argument if the lengths of a shape differ too much. `names` is the subject of the sentence.
+inline void require_ratio(double shortest, double longest, const char* names) {
+  require(longest <= kLargestRatio * shortest, std::string(names) + " must differ by a factor of at most 1e15");
+}
+
 }  // namespace overlapper

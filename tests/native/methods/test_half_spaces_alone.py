@@ -159,8 +159,7 @@ def test_three_walls_of_a_prism_and_a_lid_leave_it_open_however_they_are_rounded
             overlap(*prism, HalfSpace(lid[0] * np.cross(a, b), lid[1]))
 
 
-@pytest.mark.parametrize("thin", [1e-17, 1e-20])
-def test_the_article_has_no_polytope_of_a_body_thinner_than_rounding(thin):
-    plate = Box([1, thin, 1])
+def test_the_article_has_no_polytope_of_a_body_as_thin_as_rounding():
+    plate = Box([1, 1.1e-15, 1])
     assert overlap(plate, Box([1, 1, 1]), method="paper").status == "touching"
     assert overlap(plate, Placed(Box([1, 1, 1]), (0, 3, 0)), method="paper").status == "separated"
