@@ -852,6 +852,28 @@ def thin_plates(rng):
     )
 
 
+def thin_round(rng):
+    return pierced(rng, power(rng, -12, -6))
+
+
+def pierced(rng, thin):
+    """A round body about a metre wide, and a plate or a needle of thickness `parameter` through its middle."""
+    sides = rng.permutation([thin, 1.0, float(rng.choice([thin, 1.0]))]) * rng.uniform(0.4, 1, 3)
+    wide, r = rng.uniform(0.4, 1), rng.uniform(0.4, 1)
+    flat = [
+        Capsule(thin, wide), Cylinder(thin, wide), Cylinder(wide, thin), Box(sides),
+        Ellipsoid(sides),
+    ][int(rng.integers(5))]  # fmt: skip
+    other = [
+        Sphere(r), Capsule(r, wide), Cylinder(r, wide), Ellipsoid(rng.uniform(0.4, 1, 3)),
+        RoundedHull(CORNERS * rng.uniform(0.2, 0.6, 3), 0.1),
+    ][int(rng.integers(5))]  # fmt: skip
+    where = rng.normal(size=3) * float(rng.choice([0, 0.2]))
+    turns = [(0, 0, 0, 1) if rng.random() < 0.3 else quaternion(rng) for _ in range(2)]
+    bodies = Placed(other, where, turns[0]), Placed(flat, (0, 0, 0), turns[1])
+    return Case(f"{type(other).__name__} and {type(flat).__name__}", thin, bodies)
+
+
 def special_poses(rng):
     """Two bodies, one of them round, of few lengths, turned by few angles, so that centres, ends, rims, seams, edges or
     corners of the one lie on those of the other, or do but for `parameter` of a metre."""
@@ -969,7 +991,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
         round_contacts, rounded_hulls, rounded_meshes, folded_hulls, tilted_round, flush_round, caps_on_edges,
-        thin_plates, special_poses, ellipsoids, posed_ellipsoids, *([more_kinds] if MORE_SHAPES else []),
+        thin_plates, thin_round, special_poses, ellipsoids, posed_ellipsoids, *([more_kinds] if MORE_SHAPES else []),
     )
 }  # fmt: skip
 

@@ -182,14 +182,15 @@ def volume_of_hulls_is_right_to_twelve_digits(case: Case, found: Overlap) -> str
 def volume_of_round_pairs_is_known_to_eleven_digits(case: Case, found: Overlap) -> str:
     """Bodies are exempt if tangent planes enclose their common part, as that of an ellipsoid and a capsule. Special and
     nearly parallel poses have eight digits, as the volume between nearly equal surfaces, or near the plane of a slice,
-    may stay open. In special poses, planes enclose the parts that slices give up."""
+    may stay open. In special poses and of thin bodies, planes enclose the parts that slices give up."""
     kinds = [type(body.shape) for body in found.shapes]
     others = {*kinds} - {*FLAT, *ROUND}
     enclosed = bool(others) and not (others == {Ellipsoid} and {*kinds} <= {*FLAT, Sphere, Ellipsoid})
-    given_up = case.family == "special_poses" and "dual" in found.way
+    given_up = case.family in ("special_poses", "thin_round") and "dual" in found.way
     if not (case.round and found and len(kinds) == 2) or enclosed or given_up:
         return ""
-    share, most = found.volume_error / found.volume, 1e-8 if case.family in ("special_poses", "tilted_round") else 1e-11
+    less = case.family in ("special_poses", "tilted_round", "thin_round")
+    share, most = found.volume_error / found.volume, 1e-8 if less else 1e-11
     return "" if share <= most else f"the volume is known to {share:.3g} of itself, by {found.way}"
 
 

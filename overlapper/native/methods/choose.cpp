@@ -178,6 +178,12 @@ Settled settled_in_wide_arithmetic(const Arrangement& at, double reach, std::vec
   return settled;
 }
 
+/// The largest ball in the common set of bodies that overlap, however thin the set is.
+WideBall wide_ball_of_overlap(const Arrangement& at, double reach, std::span<const OwnedPlane> hints) {
+  const double plane_rounding = wide_rounding(reach);
+  return wide_deepest_ball(at.wide_bodies(), hints, 4 * plane_rounding, reach, plane_rounding);
+}
+
 /// Up to so many half-spaces, any four of all are tried. With more, any four of those that the search has looked at are
 /// tried.
 constexpr size_t kMostTried = 16;
@@ -201,6 +207,12 @@ void settle_half_spaces(std::span<const Placed> bodies, std::span<const OwnedPla
     throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
   if (search.status == Status::kSeparated)
     throw std::invalid_argument("shapes must meet near their planes: half-spaces alone meet too far away");
+}
+
+/// Takes the ball of double-double arithmetic.
+void look_closely(Inside& inside, WideBall ball, double reach) {
+  inside.ball.upper = ball.upper, inside.ball.rounding = wide_rounding(reach);
+  inside.wide_ball = std::move(ball);
 }
 
 /// True if the bodies certainly overlap because the distance of their cores is less than the sum of their radii. A
@@ -277,11 +289,7 @@ Search search(const Arrangement& at) {
     search.way = settled.status == Status::kSeparated     ? Way::kWideSeparation
                  : settled.status == Status::kOverlapping ? Way::kWideDual
                                                           : Way::kDoubt;
-    inside.wide_ball = std::move(settled.ball);
-    if (inside.wide_ball) {
-      inside.ball.upper = inside.wide_ball->upper;
-      inside.ball.rounding = wide_rounding(search.reach);
-    }
+    if (settled.ball) look_closely(inside, std::move(*settled.ball), search.reach);
   }
   if (std::ranges::none_of(bodies, [](const Placed& body) { return bounded(body.shape); }))
     settle_half_spaces(bodies, inside.ball.cuts, search);
@@ -292,7 +300,7 @@ Search search(const Arrangement& at) {
 Inside look_inside(const Arrangement& at, const Search& found) {
   Inside inside{gather_planes<Placed>(at.relative), {}, {}};
   inside.ball = deepest_ball(at.relative, found.reaches, inside.planes, found.hints);
-  if (!inside.ball.sure) inside.wide_ball = settled_in_wide_arithmetic(at, found.reach, inside.ball.cuts).ball;
+  if (!inside.ball.sure) look_closely(inside, wide_ball_of_overlap(at, found.reach, inside.ball.cuts), found.reach);
   return inside;
 }
 
@@ -335,16 +343,23 @@ MeasuresAndInertia by_region(const Region& region, std::span<const Placed> bodie
 /// The region about the middle of the largest ball in double-double, if there is one. The point for doubles may not be
 /// inside after all, or its frame may not be round.
 std::optional<Region> grown_in_wide_arithmetic(const OverlappingBodies& overlapping) {
-  const double reach = overlapping.search().reach, plane_rounding = wide_rounding(reach);
+  const double reach = overlapping.search().reach;
   const Arrangement& at = overlapping.at;
-  const WideBall ball =
-      wide_deepest_ball(at.wide_bodies(), overlapping.inside().ball.cuts, 4 * plane_rounding, reach, plane_rounding);
+  const WideBall ball = wide_ball_of_overlap(at, reach, overlapping.inside().ball.cuts);
   if (!(ball.lower > 0)) return std::nullopt;
   return grown_about(ball, at, reach, overlapping.tolerance);
 }
 
 /// The relative error of a volume; infinite if rounding has turned the polytope inside out.
 double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 ? m.volume_error : kInfinity; }
+
+/// The error of a volume is not larger than the volume of what may be common to the bodies, however flat the polytope.
+/// If rounding has turned the polytope inside out, the volume is between 0 and that bound.
+void bound_by_ball(const OverlappingBodies& overlapping, Measures& m) {
+  const double most = touching_volume(overlapping.bodies, overlapping.inside().ball);
+  if (!(m.volume > 0)) m.volume = m.volume_error = most / 2;
+  else if (!(m.volume_error <= std::max(m.volume, most))) m.volume_error = std::max(m.volume, most);
+}
 
 WideVector point_inside(const OverlappingBodies& overlapping) {
   if (overlapping.search().between) return wide(*overlapping.search().between);
@@ -420,7 +435,11 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
     // If slices give up, features lie so near each other that a closed form may confuse them, too.
     if (formula && !(error_of(formula->measures) <= kSureOfFormula * formula->measures.volume)) formula.reset();
   }
-  if (in_doubt) return by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);
+  if (in_doubt) {
+    kept = by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);
+    bound_by_ball(overlapping, kept.measures);
+    return kept;
+  }
   if (formula) kept = std::move(*formula);
   else kept = by_region(overlapping.region(), overlapping.bodies, overlapping.traced ? Way::kTracing : Way::kDual);
   const auto keep_better = [&](const Region& region) {
@@ -438,6 +457,8 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
       kept.measures.volume_error +=
           kept.measures.volume + touching_volume(overlapping.bodies, overlapping.inside().ball);
   }
+  if (!(error_of(kept.measures) <= kept.measures.volume) && in_wide_arithmetic())
+    bound_by_ball(overlapping, kept.measures);
   return kept;
 }
 

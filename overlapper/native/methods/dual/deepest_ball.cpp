@@ -152,9 +152,20 @@ Orthogonalised orthogonalise(std::span<const Vec3> a) {
   return result;
 }
 
-/// Three orthonormal axes whose first is the given unit vector, by rows.
-Mat3 axes_along(Vec3 first) {
-  const Vec3 second = any_orthogonal(first);
+/// Three orthonormal axes by rows. The first is the normal of the plane with the least slack. In these axes, the large
+/// entries of the rows of a sliver are in one column. If the set is also narrow beside that normal, the second axis
+/// lies along the narrowest direction: the large entries of the rows of a needle are in two columns.
+Mat3 axes_of(std::span<const Vec3> normals, std::span<const double> slacks) {
+  constexpr double kNarrow = 0x1p-20;
+  const Vec3 first = normals[std::ranges::min_element(slacks) - slacks.begin()];
+  Vec3 second = any_orthogonal(first);
+  double narrowest = kNarrow * std::ranges::max(slacks);
+  for (size_t i = 0; i < normals.size(); ++i) {
+    const Vec3 across = normals[i] - dot(first, normals[i]) * first;
+    const double length = norm(across);
+    if (length > kNarrow && slacks[i] < narrowest * length)
+      narrowest = slacks[i] / length, second = unit(across - dot(first, across) * first);
+  }
   return {first, second, cross(first, second)};
 }
 
@@ -197,21 +208,18 @@ class AnalyticCentre {
   explicit AnalyticCentre(const Point& inside) { frame_.origin = inside; }
 
   void settle(std::span<const Owned<AnyPlane>> planes) {
+    std::vector<Vec3> normals, a;
+    std::vector<double> slacks(planes.size());
+    for (const Owned<AnyPlane>& p : planes) normals.push_back(rounded(p.plane.normal));
     for (int step = 0; step < kMaxSteps; ++step) {
       cancellation_point(planes.size());
-      std::vector<Vec3> a;
-      Vec3 nearest{1, 0, 0};
-      double closest = kInfinity;
-      for (const Owned<AnyPlane>& p : planes) {
-        const double slack = -rounded(signed_distance(p.plane, frame_.origin));
-        if (slack < closest) closest = slack, nearest = rounded(p.plane.normal);
-      }
-      // In axes along the nearest plane's normal, the large entries of a sliver's rows are in one column.
-      const Mat3 axes = axes_along(nearest);
-      for (const Owned<AnyPlane>& p : planes) {
-        const double slack = -rounded(signed_distance(p.plane, frame_.origin));
-        a.push_back(rounded(axes * p.plane.normal) / std::max(slack, std::numeric_limits<double>::min()));
-      }
+      for (size_t i = 0; i < planes.size(); ++i) slacks[i] = -rounded(signed_distance(planes[i].plane, frame_.origin));
+      // By rounding, the origin may lie on a plane or beyond it. Newton's method then takes the rounding for the slack.
+      const double least = kRounding * std::max(norm(rounded(frame_.origin)), std::ranges::max(slacks));
+      const Mat3 axes = axes_of(normals, slacks);
+      a.clear();
+      for (size_t i = 0; i < planes.size(); ++i)
+        a.push_back(rounded(axes * planes[i].plane.normal) / std::max(slacks[i], least));
       const Orthogonalised frame = orthogonalise(a);
       frame_.axes = transposed(axes) * frame.inverse_r;
       Vec3 newton;
@@ -225,6 +233,7 @@ class AnalyticCentre {
   void restart(const Point& inside) { frame_.origin = inside; }
 
  private:
+  static constexpr double kRounding = std::is_same_v<Point, Vec3> ? 0x1p-53 : 0x1p-106;
   static constexpr int kMaxSteps = 64;
   FrameAbout<Point> frame_;
 };

@@ -38,12 +38,14 @@ struct Totals : Moments {
 };
 
 /// m³: bound of the missing volume if the area vectors of the whole surface do not sum to zero: their sum times the
-/// extent along it.
+/// extent along it. The whole volume for a set so thin that a sum over the rest of it is rounding.
 inline double missing(const Totals& totals) {
   const Vec3 u = totals.unbalanced, s = totals.squares, p = totals.products;
   const double square =
       u.x * u.x * s.x + u.y * u.y * s.y + u.z * u.z * s.z + 2 * (u.y * u.z * p.x + u.z * u.x * p.y + u.x * u.y * p.z);
   const double rounding = slicing::kSummation * totals.border * std::sqrt((s.x + s.y + s.z) / totals.volume);
+  constexpr double kThin = 1e-3;
+  if (!(rounding <= kThin * totals.volume)) return totals.volume;
   return std::max(0.0, std::sqrt(std::max(0.0, square / totals.volume)) - rounding);
 }
 

@@ -370,7 +370,9 @@ class Settling {
       const double low = values[i], high = values[i + 1];
       if (low >= low_ && high <= high_ && high - low > 1e-14 * size_near(low, high) && !settle(low, high)) return false;
     }
-    if (!intervals_.empty()) refine();
+    if (intervals_.empty()) return true;
+    intervals_.back().joined += joined_;
+    refine();
     return true;
   }
 
@@ -404,11 +406,12 @@ class Settling {
     const double pointlike =
         std::max((closely_ ? kPointlikeClosely : kPointlike) * size_near(low, high), kRounded * far);
     if (high - low < pointlike && !intervals_.empty()) {
-      intervals_.back().high = high;
+      intervals_.back().high = high, joined_ += high - low;
       return;
     }
+    joined_ = 0;
     if (intervals_.size() == 1 && intervals_[0].high - intervals_[0].low < pointlike) {
-      intervals_[0] = {intervals_[0].low, high, between};
+      intervals_[0] = {intervals_[0].low, high, between, intervals_[0].joined + low - intervals_[0].low};
       return;
     }
     if (!intervals_.empty() && intervals_.back().outline == between) intervals_.back().high = high;
@@ -550,6 +553,7 @@ class Settling {
   std::vector<Interval>& intervals_;
   double low_, high_;                                        ///< slices outside are empty
   double inside_ = std::numeric_limits<double>::infinity();  ///< this slice is not empty
+  double joined_ = 0;  ///< the width of the pointlike intervals after the last other one
   int events_ = 0;
   Outline latest_;
 };

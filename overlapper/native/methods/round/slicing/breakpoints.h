@@ -10,6 +10,7 @@ namespace overlapper::slicing {
 struct Interval {
   double low, high;
   Outline outline;
+  double joined = 0;  ///< of the first and the last interval: the width of pointlike intervals that were joined to it
 };
 
 /// The contiguous intervals with non-empty slices of a stack; false if they cannot be determined.

@@ -68,6 +68,11 @@ double integrate_whole(const Stack& stack, const DrawnIntervals& drawn, double v
   add_end_face(stack, stack.low_plane, stack.low, -1, drawn.drawn_low, lowest.low, lowest.outline, few, sum.integrals);
   add_end_face(stack, stack.high_plane, stack.high, 1, drawn.drawn_high, highest.high, highest.outline, few,
                sum.integrals);
+  // A flat end may lie within a pointlike interval. The slices of another outline then end before it or beyond it.
+  if (!sum.samples.empty()) {
+    sum.error += lowest.joined * std::max(0.0, sum.samples.front().area);
+    if (drawn.intervals.size() > 1) sum.error += highest.joined * std::max(0.0, sum.samples.back().area);
+  }
   // Otherwise the error is the size of the piece, which may be only rounding.
   if (!sound || !(sum.integrals.volume > 0) || !within_chords(lowest.low, highest.high, sum))
     return 8 * std::abs(sum.about) + std::abs(sum.integrals.volume);
