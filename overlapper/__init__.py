@@ -23,6 +23,7 @@ from overlapper._core import (
     penetration_depth,
 )
 from overlapper.face import lazily as _lazily
+from overlapper.functions import introspect as _introspect
 from overlapper.functions import introspectable as _introspectable
 from overlapper.shapes import Shape
 
@@ -65,6 +66,22 @@ iou = _introspectable(iou)
 overlap = _introspectable(overlap)
 overlaps = _introspectable(overlaps)
 penetration_depth = _introspectable(penetration_depth)
+for _kind in (
+    Batch,
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Overlap,
+    Overlaps,
+    Placed,
+    RoundedHull,
+    Sphere,
+):
+    _introspect(_kind)
+del _kind
 
 # These names are imported on first access. The pytest plugin is a module of this package, so an import of numpy here
 # would delay every start of pytest. An import by * leaves out names that need more than numpy.

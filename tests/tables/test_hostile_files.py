@@ -99,7 +99,7 @@ def test_a_mutated_shape_is_read_or_refused_in_one_sentence(data):
             json.dumps(["Hull", base64.b64encode(zlib.compress(CORNERS.tobytes())[:-9]).decode()]),
             "its vertices are cut",
         ),
-        ('["Sphere", 1, 2, 3]', "__init__"),
+        ('["Sphere", 1, 2, 3]', r"Sphere\(radius\): too many positional arguments"),
         ('[["Sphere"], 1]', "unhashable"),
         ("[]", "not enough values"),
         ('["Sphere", 1e999]', "radius"),

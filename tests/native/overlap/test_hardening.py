@@ -118,7 +118,10 @@ def test_answers_cover_every_public_name():
     }  # what functions return, and a typing alias
     assert {name for name, value in vars(_core).items() if not isinstance(value, type) and name[0] != "_"} <= {
         *used,
+        "explain_constructor",
+        "explain_with",
         "function",
+        "method",
     }
 
 

@@ -1,6 +1,6 @@
 """Convex shapes and the polytopes they share."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal, overload
 
 import numpy
@@ -978,4 +978,19 @@ class ContactSolver:
         """
 
 def function(core: Any) -> Any:
-    """Calls a function of the core. Attributes can be set."""
+    """
+    Calls the core. Attributes can be set, and refused arguments are explained.
+    """
+
+def method(core: Any) -> Any:
+    """
+    Calls the core. Attributes can be set, and refused arguments are explained.
+    """
+
+def explain_constructor(type: type) -> None:
+    """Refused arguments of the class are explained."""
+
+def explain_with(said_by: Callable[[Any, list[Any], dict[str, Any]], str]) -> None:
+    """
+    Sets the function that says which argument is wrong, from what was called and its arguments.
+    """
