@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 from typing import get_args
 
+from sphinx.ext.napoleon import Config, NumpyDocstring
+
 from overlapper import Shape, __version__
 
 DOCS = Path(__file__).parent
@@ -34,6 +36,9 @@ toc_object_entries_show_parents = "hide"
 # Where files that are no page are to be read, as https://host/owner/name/blob/commit. A site that is built at home
 # links to the files beside it.
 repository = os.environ.get("OVERLAPPER_REPOSITORY", "")
+
+# Types in the sections of docstrings are words, such as "(n, 3) array_like", and not links.
+SECTIONS = Config(napoleon_use_param=False, napoleon_use_rtype=False)
 
 LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|!\[[^\]]*\]\([^)]*\))+)\]\(([^()\s]+)\)")
 FENCED = re.compile(r"^(```.*?^```$)", re.MULTILINE | re.DOTALL)
@@ -90,6 +95,9 @@ def as_rst(lines):
     """Docstrings are plain text with `code` and examples; to reStructuredText, other characters mean something."""
     written, paragraphs = [], "\n".join(lines).strip("\n").split("\n\n")
     for paragraph in paragraphs:
+        if paragraph.startswith(">>>"):
+            written.append(paragraph)
+            continue
         if paragraph.startswith("    "):
             within = written and written[-1].startswith("    ")
             written.append(paragraph if within else ".. code-block:: python\n\n" + paragraph)
@@ -106,7 +114,10 @@ def as_rst(lines):
 
 def process_docstring(app, what, name, obj, options, lines):
     kept = [line for line in lines if line != "Overloaded function." and not NUMBERED.match(line)]
-    lines[:] = [*as_rst(kept), ""]
+    written = as_rst(kept)
+    if what not in ("attribute", "property"):  # the first colon of these would be taken for the end of a type
+        written = NumpyDocstring(written, SECTIONS, app, what, name, obj, options).lines()
+    lines[:] = [*written, ""]
 
 
 def process_signature(app, what, name, obj, options, signature, returned):

@@ -65,17 +65,50 @@ class Tabular(ABC):
         """The columns by name, all of the same length. A missing number is NaN."""
 
     def to_arrow(self) -> pyarrow.Table:
-        """A pyarrow.Table, columns as those of `overlapper run`. ImportError without pyarrow."""
+        """A table of pyarrow with the columns of `overlapper run`.
+
+        Returns
+        -------
+        pyarrow.Table
+            A row for each pair.
+
+        Raises
+        ------
+        ImportError
+            Without pyarrow.
+        """
         arrow = _library("pyarrow")
         return arrow.table({name: arrow.array(values, from_pandas=True) for name, values in self.columns().items()})
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A pandas.DataFrame, columns as those of `overlapper run`. ImportError without pandas."""
+        """A table of pandas with the columns of `overlapper run`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each pair.
+
+        Raises
+        ------
+        ImportError
+            Without pandas.
+        """
         frame: pandas.DataFrame = _library("pandas").DataFrame(self.columns())
         return frame
 
     def to_polars(self) -> polars.DataFrame:
-        """A polars.DataFrame, columns as those of `overlapper run`. ImportError without polars."""
+        """A table of polars with the columns of `overlapper run`.
+
+        Returns
+        -------
+        polars.DataFrame
+            A row for each pair.
+
+        Raises
+        ------
+        ImportError
+            Without polars.
+        """
         frame: polars.DataFrame = _library("polars").DataFrame(self.columns(), nan_to_null=True)
         return frame
 

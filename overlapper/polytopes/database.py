@@ -55,18 +55,35 @@ BATCH = 1_000  # polytopes sent at a time
 def read_polytopes(
     url: str, query: str | None = None, *, on_bad: Callable[[Any, str], object] | None = None
 ) -> Iterator[tuple[Any, Hull]]:
-    """The polytopes of a database one after another, each with its id. Only a few are in memory at a time.
+    """Read the polytopes of a database one after another. Only a few are in memory at a time.
 
-    `url` is SQLAlchemy's, such as "sqlite:///parts.db" or "postgresql+psycopg://user@host/parts". `query` returns four
-    columns: the id (of any type) and x, y, z of a point in m. The points of a polytope must come one after another, as
-    by ORDER BY id. Without a query, the tables that `write_polytopes` makes are read. Points inside a polytope are
-    allowed. SQLite and PostgreSQL refuse a query that writes. Sessions of MySQL and MariaDB are told to refuse it,
-    which is not tested. In other databases, writes are rolled back.
+    SQLite and PostgreSQL refuse a query that writes. Sessions of MySQL and MariaDB are told to refuse it, which is not
+    tested. In other databases, writes are rolled back.
 
-    An invalid polytope (a coordinate missing, fewer than four points, all in one plane) raises ValueError with its id.
-    If `on_bad` is given, `on_bad(id, reason)` is called instead, and reading goes on. Raises FileNotFoundError if there
-    is no such SQLite file, ValueError if the query has other columns or another order, and
-    sqlalchemy.exc.SQLAlchemyError if the database refuses the query.
+    Parameters
+    ----------
+    url : str
+        URL of SQLAlchemy, such as "sqlite:///parts.db" or "postgresql+psycopg://user@host/parts".
+    query : str, optional
+        SQL that returns four columns: the id (of any type) and x, y, z of a point in m. The points of a polytope must
+        come one after another, as by ORDER BY id. Default: the tables that `write_polytopes` makes.
+    on_bad : callable, optional
+        Called as on_bad(id, reason) for an invalid polytope, instead of the ValueError. Reading then continues.
+
+    Yields
+    ------
+    tuple of (id, Hull)
+        The convex hull of the points of each polytope, with its id.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such SQLite file.
+    ValueError
+        If the query has other columns or another order. Also, without `on_bad`, for an invalid polytope: a coordinate
+        is missing, there are fewer than four points, or all points lie in one plane.
+    sqlalchemy.exc.SQLAlchemyError
+        If the database refuses the query.
     """
     _must_exist(sql.make_url(url))
     with ExitStack() as stack:
@@ -93,11 +110,28 @@ def read_polytopes(
 
 
 def write_polytopes(url: str, polytopes: Iterable[tuple[int, Hull | Overlap | ArrayLike]]) -> int:
-    """Adds polytopes to a database, each with its id, and returns their number.
+    """Add polytopes to a database, each with its id.
 
-    Each polytope is a Hull, an Overlap or (n, 3) points in m. The corners of its convex hull are written. Missing
-    tables are made. Everything is one transaction: if it raises, nothing is written. Raises ValueError with the id for
-    points that span no polytope, and sqlalchemy.exc.IntegrityError for an id that exists already.
+    Missing tables are made. Everything is one transaction: if it raises, nothing is written.
+
+    Parameters
+    ----------
+    url : str
+        URL of SQLAlchemy, such as "sqlite:///parts.db".
+    polytopes : iterable of (id, polytope)
+        Each polytope is a Hull, an Overlap or (n, 3) points in m. The vertices of its convex hull are written.
+
+    Returns
+    -------
+    int
+        The number of polytopes written.
+
+    Raises
+    ------
+    ValueError
+        If the points of an id span no polytope.
+    sqlalchemy.exc.IntegrityError
+        If an id exists already.
     """
     count = 0
     remaining = iter(polytopes)

@@ -74,10 +74,26 @@ def read_triangles(path: str | Path) -> Array:
 
 
 def read_hull(path: str | Path) -> Hull:
-    """The convex hull of everything in a mesh file, in the file's own frame. Its unit is taken for m.
+    """The convex hull of everything in a mesh file, in the file's own frame.
 
-    Warns of a mesh with holes or dents (NotConvexWarning), because its hull is not the solid itself. Raises OSError if
-    there is no such file, ValueError if it is no mesh or its points span no polytope.
+    A mesh with holes or dents gives a NotConvexWarning, because its hull is not the solid itself.
+
+    Parameters
+    ----------
+    path : str or Path
+        The mesh file. Its unit is read as m.
+
+    Returns
+    -------
+    Hull
+        The convex hull of all points.
+
+    Raises
+    ------
+    OSError
+        If there is no such file.
+    ValueError
+        If the file is not a mesh, or its points span no polytope.
     """
     hull, closed, share = _parsed(path, "is not a mesh with a hull", mesh_parser.hull)
     if not closed:
@@ -123,10 +139,20 @@ def check_ending(path: str | Path) -> None:
 
 
 def write_mesh(path: str | Path, polytope: Hull | Overlap | Sequence[Hull | Overlap]) -> None:
-    """Writes hulls or overlaps as a triangle mesh in m, each as a closed surface. The name ends in .obj, .stl or .ply.
+    """Write hulls or overlaps as a triangle mesh in m, each as a closed surface.
 
-    OBJ keeps coordinates to 16 decimal places. STL and PLY keep single precision, one part in ten million.
-    Raises ValueError for another ending, and for bodies that share nothing.
+    Parameters
+    ----------
+    path : str or Path
+        The file, which ends in .obj, .stl or .ply. OBJ keeps coordinates to 16 decimal places. STL and PLY keep single
+        precision, one part in ten million.
+    polytope : Hull, Overlap or sequence of these
+        What to write.
+
+    Raises
+    ------
+    ValueError
+        If the file has another ending, or if the bodies have no common part.
     """
     check_ending(path)
     pieces = [each for each in (polytope if isinstance(polytope, Sequence) else [polytope]) if len(each.facets)]

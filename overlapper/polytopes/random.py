@@ -15,12 +15,34 @@ Source = Literal["cube", "ball", "sphere", "halfspaces"]
 
 
 def random_polytope(n: int, source: Source = "cube", *, rng: np.random.Generator | int | None = None) -> Hull:
-    """A random polytope about the origin: the hull of a cloud of n random points, or the cell between n random planes.
+    """A random polytope about the origin: the hull of random points, or the cell between random planes.
 
-    `source` is the set from which points or planes are drawn uniformly. Points are in the "cube" [-1, 1]³, in the unit
-    "ball" or on the unit "sphere". Planes of "halfspaces" touch the unit sphere from outside. Every point on the sphere
-    becomes a corner, every half-space a facet. A cell that is unbounded or reaches beyond 10 is drawn again. Lengths
-    are in m. `rng` is a numpy Generator, a seed, or None for another polytope each time. ValueError for n below 4.
+    Parameters
+    ----------
+    n : int
+        Number of points or planes, at least 4.
+    source : {'cube', 'ball', 'sphere', 'halfspaces'}, default 'cube'
+        The set from which points or planes are drawn uniformly. Points lie in the cube [-1, 1]³, in the unit ball or on
+        the unit sphere, in m. Planes of 'halfspaces' touch the unit sphere from outside.
+    rng : numpy.random.Generator or int, optional
+        A generator or a seed. Default: another polytope each time.
+
+    Returns
+    -------
+    Hull
+        The polytope. Every point on the sphere becomes a vertex, every half-space a facet. A cell that is unbounded or
+        reaches beyond 10 m is drawn again.
+
+    Raises
+    ------
+    ValueError
+        If `n` is below 4, or `source` is unknown.
+
+    Examples
+    --------
+    >>> from overlapper import random_polytope
+    >>> random_polytope(20, "sphere", rng=0)
+    Hull(20 vertices, 36 facets)
     """
     if source not in get_args(Source):
         raise ValueError(f"source must be one of {', '.join(get_args(Source))}, not {source!r}")

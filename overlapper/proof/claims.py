@@ -120,16 +120,35 @@ def check_balance(planes: tuple[OwnedPlane, ...]) -> None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Separated(Short):
-    """No point is below all of at most four `planes` of `shapes`: normals add up to zero, offsets to less than zero.
+    """A certificate that no point is below all planes, so that the bodies have no common point.
 
-    For a pair, the planes are the two sides of a gap. The lengths of the normals contain the weights of Farkas' lemma.
+    The normals of the planes add up to zero, and the offsets to less than zero. The lengths of the normals contain the
+    weights of Farkas' lemma. For a pair, the planes are the two sides of a gap.
+
+    Parameters
+    ----------
+    shapes : tuple of Placed
+        The bodies.
+    planes : tuple of OwnedPlane
+        At most four planes. Each has all of one body below it.
     """
 
     shapes: tuple[Placed, ...]
     planes: tuple[OwnedPlane, ...]
 
     def verify(self) -> Bounds:
-        """Bounds of the volume, m³, that follow from the shapes alone; CertificateError names what does not hold."""
+        """Check the certificate from the shapes alone, in rational arithmetic.
+
+        Returns
+        -------
+        tuple of (Fraction, Fraction)
+            Lower and upper bound of the common volume in m³.
+
+        Raises
+        ------
+        CertificateError
+            If a condition does not hold. The message names the condition.
+        """
         check_planes(self.shapes, self.planes)
         check_balance(self.planes)
         require(sum(plane.offset for plane in self.planes) < 0, "offsets must add up to less than zero")
@@ -138,10 +157,22 @@ class Separated(Short):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Touching(Short):
-    """The bodies nearly have a gap, and nearly have a common point.
+    """A certificate that the bodies nearly have a gap, and nearly have a common point.
 
-    At most four `planes` of `shapes`, whose normals add up to zero, leave no room for a ball larger than `inradius`.
-    The points `nearest` (m, 3) lie one in each body. `point` (3,) is no farther than `miss` from each of them.
+    Parameters
+    ----------
+    shapes : tuple of Placed
+        The bodies.
+    planes : tuple of OwnedPlane
+        At most four planes, whose normals add up to zero. They leave no room for a ball larger than `inradius`.
+    inradius : Fraction
+        Upper bound of the radius of a ball in the common set, m.
+    point : (3,) ndarray of Fraction
+        A point near all bodies, m.
+    nearest : (m, 3) ndarray of Fraction
+        A point in each body, m.
+    miss : Fraction
+        Upper bound of the distance of `point` from each of `nearest`, m.
     """
 
     shapes: tuple[Placed, ...]
@@ -152,7 +183,18 @@ class Touching(Short):
     miss: Fraction
 
     def verify(self) -> Bounds:
-        """Bounds of the volume, m³, that follow from the shapes alone; CertificateError names what does not hold."""
+        """Check the certificate from the shapes alone, in rational arithmetic.
+
+        Returns
+        -------
+        tuple of (Fraction, Fraction)
+            Lower and upper bound of the common volume in m³.
+
+        Raises
+        ------
+        CertificateError
+            If a condition does not hold. The message names the condition.
+        """
         check_planes(self.shapes, self.planes)
         check_balance(self.planes)
         require_number(self.inradius)
@@ -171,11 +213,16 @@ class Touching(Short):
         return Fraction(0), self.volume_bound()
 
     def volume_bound(self) -> Fraction:
-        """The inradius times the surface of a box around the common part.
+        """Upper bound of the common volume: the inradius times the surface of a box around the common part.
 
         The inner parallel bodies of a convex set have less surface than the set. The set has less surface than a box
         around it. The volume is the integral of the surfaces of the inner parallel bodies over depths from 0 to the
         inradius.
+
+        Returns
+        -------
+        Fraction
+            The bound in m³.
         """
         bounded = [body for body in map(RationalBody, self.shapes) if body.facts.bounded]
         require(bool(bounded), "one of the bodies must be bounded")
@@ -194,13 +241,28 @@ def support_above(body: RationalBody, direction: Exact) -> Fraction:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Overlapping(Short):
-    """Planes around the common part, and a star inside the common part.
+    """A certificate of planes around the common part, and of a star-shaped polytope inside it.
 
-    A ball of radius `margin` about `point` (3,) lies in all bodies. Polygons `rings[k]` of `vertices` (n, 3),
-    counter-clockwise from outside, surround the point. Polygon k lies in plane `facet[k]`, up to rounding. `pull[v]` is
-    in (0, 1]: the point at this share of the way from `point` to vertex v lies in all bodies. The polytope of the
-    vertices, shrunk by the least `pull` about `point`, therefore lies in all bodies. Each of `planes` bounds one of
-    `shapes`.
+    The polytope of the vertices, shrunk by the least `pull` about `point`, lies in all bodies.
+
+    Parameters
+    ----------
+    shapes : tuple of Placed
+        The bodies.
+    planes : tuple of OwnedPlane
+        Planes around the common part. Each bounds one of the bodies.
+    vertices : (n, 3) ndarray of Fraction
+        Vertices of the polygons, m.
+    rings : tuple of ndarray of int32
+        Polygons around `point`: indices into `vertices`, counter-clockwise from outside.
+    facet : (k,) ndarray of int32
+        The plane of each polygon, up to rounding errors.
+    point : (3,) ndarray of Fraction
+        Centre of a ball that lies in all bodies, m.
+    margin : Fraction
+        Radius of this ball, m.
+    pull : (n,) ndarray of Fraction
+        In (0, 1]: the point at this share of the way from `point` to the vertex lies in all bodies.
     """
 
     shapes: tuple[Placed, ...]
@@ -213,7 +275,18 @@ class Overlapping(Short):
     pull: Exact
 
     def verify(self) -> Bounds:
-        """Bounds of the volume, m³, that follow from the shapes alone; CertificateError names what does not hold."""
+        """Check the certificate from the shapes alone, in rational arithmetic.
+
+        Returns
+        -------
+        tuple of (Fraction, Fraction)
+            Lower and upper bound of the common volume in m³.
+
+        Raises
+        ------
+        CertificateError
+            If a condition does not hold. The message names the condition.
+        """
         check_planes(self.shapes, self.planes)
         count = len(self.pull) if type(self.pull) is np.ndarray and self.pull.ndim == 1 else 0
         require_array("pull", self.pull, count)
@@ -279,11 +352,20 @@ class Overlapping(Short):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bracketed(Short):
-    """The volume that `shapes`, which may be round, share is not below `lower` and not above `upper`, in m³.
+    """A certificate of a lower and an upper bound of the common volume of bodies, which may be round.
 
-    The check computes the volume anew from the numbers of the shapes, in ball arithmetic with as many bits as necessary
-    (see `overlapper.proof.volume`). It needs python-flint. All threads share python-flint's number of bits, so only one
-    check may run at a time.
+    The check computes the volume again from the numbers of the shapes, in ball arithmetic with as many bits as
+    necessary (see `overlapper.proof.volume`). It needs python-flint. All threads share python-flint's number of bits,
+    so only one check may run at a time.
+
+    Parameters
+    ----------
+    shapes : tuple of Placed
+        The bodies.
+    lower : Fraction
+        Lower bound, m³.
+    upper : Fraction
+        Upper bound, m³.
     """
 
     shapes: tuple[Placed, ...]
@@ -291,7 +373,18 @@ class Bracketed(Short):
     upper: Fraction
 
     def verify(self) -> Bounds:
-        """Bounds of the volume, m³, that follow from the shapes alone; CertificateError names what does not hold."""
+        """Check the certificate from the shapes alone, in ball arithmetic.
+
+        Returns
+        -------
+        tuple of (Fraction, Fraction)
+            Lower and upper bound of the common volume in m³.
+
+        Raises
+        ------
+        CertificateError
+            If a condition does not hold. The message names the condition.
+        """
         require_bodies(self.shapes)
         require_number(self.lower)
         require_number(self.upper)

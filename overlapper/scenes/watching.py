@@ -39,23 +39,59 @@ class Watch:
             ...  # any code that calls pybullet.stepSimulation()
         watch.summary.as_dict()
 
-    `out` is the table (.csv, .parquet, .sqlite), and `html` is the page for a browser. Both are written to files beside
-    these paths. The files take their places at the end of the `with`, by `close()`, or when the client disconnects.
-    After an error they stay beside these paths, and `written` names them. One of `every` steps is measured. `per`
-    chooses the rows of the table, and check="fcl" asks FCL, too. `surface`, `concave`, `concave_threshold` and `names`
-    are those of `simulation.Bodies`, and `pairs`, `tolerance` and `method` are those of `Bodies.overlaps`. pybullet
-    cannot be asked for pair filters, the filter mode, self-collision, height fields and files. They are known if they
-    were set after the watch began, or if `recorder` has noted them.
-
-    `physicsClientId` is the number of a pybullet client or a `mujoco.MjData`. `engine` names the simulator, as ENGINE
-    of a scene does, if the kind of simulation does not tell it.
+    The files are written beside their places. They move to their places at the end of the `with`, by `close()`, or when
+    the client disconnects. After an error they stay where they are, and `written` names them.
 
     The watch notices calls of `pybullet.stepSimulation` and `mujoco.mj_step`. It does not notice calls by a name that
     was imported from these modules earlier, steps in other processes, and steps in real time. If a step cannot be
     measured or written, the call that made the step raises the error, and the watch ends.
 
-    ValueError for a client that is not connected or an invalid option. OSError if a file cannot be written. ImportError
-    if the library that writes it is missing.
+    pybullet cannot be asked for pair filters, the filter mode, self-collision, height fields and files. They are known
+    if they were set after the watch began, or if `recorder` has noted them.
+
+    Parameters
+    ----------
+    physicsClientId : int or mujoco.MjData, default 0
+        The number of a pybullet client, or the data of a MuJoCo simulation.
+    out : str or Path, optional
+        Table to write: .csv, .parquet or .sqlite.
+    html : str or Path, optional
+        Page to write, for a browser.
+    every : int, default 1
+        Measure one step in this many.
+    pairs : {'simulated', 'all'} or list of pairs, default 'simulated'
+        The pairs to measure, as in `Bodies.pairs`.
+    surface : {'nominal', 'margin'}, default 'nominal'
+        As in `simulation.Bodies`.
+    concave : {'decompose', 'enclose', 'skip'}, default 'decompose'
+        As in `simulation.Bodies`.
+    concave_threshold : float, default 0.05
+        As in `simulation.Bodies`.
+    tolerance : float, default 0.001
+        Allowed relative error of the volume for curved shapes.
+    method : {'auto', 'paper'}, default 'auto'
+        Method of computation, as in `overlapper.overlap`.
+    per : {'shape', 'link'}, default 'shape'
+        A row of the table is a pair of shapes, or a pair of whole links.
+    check : {'fcl'}, optional
+        Compare every pair with FCL.
+    recorder : Recorder, optional
+        A recorder that was set up earlier.
+    names : dict of int to str, optional
+        Names of bodies by their numbers.
+    name : str, default 'the simulation'
+        Name of the simulation in the summary.
+    engine : str, optional
+        Name of the simulator, as ENGINE of a scene. Default: it follows from the kind of `physicsClientId`.
+
+    Raises
+    ------
+    ValueError
+        If the client is not connected, or an option is invalid.
+    OSError
+        If a file cannot be written.
+    ImportError
+        Without the library that writes a file.
     """
 
     def __init__(

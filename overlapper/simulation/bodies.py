@@ -66,10 +66,30 @@ class AnyBodies:
         threads: int | None = 1,
         pairs: Among = "simulated",
     ) -> Contacts:
-        """Pairs of shapes that overlap or touch, sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB).
+        """Pairs of shapes that overlap or touch.
 
-        `tolerance`, `method` and `threads` are those of `overlapper.overlaps`. `pairs` is the choice that
-        `Bodies.pairs` takes. A result is reused in the next call if the poses of both shapes are bit-identical.
+        A result is reused in the next call if the poses of both shapes are bit-identical.
+
+        Parameters
+        ----------
+        tolerance : float, default 0.001
+            Allowed relative error of the volume for curved shapes, between 0 and 1.
+        method : {'auto', 'paper'}, default 'auto'
+            Method of computation, as in `overlapper.overlap`.
+        threads : int or None, default 1
+            Number of threads. None: one on each core.
+        pairs : {'simulated', 'all'} or list of pairs, default 'simulated'
+            The pairs to measure, as in `pairs`.
+
+        Returns
+        -------
+        Contacts
+            Sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB).
+
+        Raises
+        ------
+        ValueError
+            If `pairs` names a body or a link that is not in the simulation.
         """
         among: Numbered = pairs if isinstance(pairs, str) else self._asked_for(pairs)
         if among == "simulated":
@@ -85,30 +105,69 @@ class AnyBodies:
         return contacts
 
     def pairs(self, among: Among = "simulated") -> NDArray[np.int32]:
-        """(n, 2) pairs of shapes whose boxes meet, as indices into `keys`: each once, the lesser first, sorted.
+        """Pairs of shapes whose bounding boxes meet.
 
-        "simulated" means the pairs that the simulator lets collide. "all" means all pairs of different bodies. Any
-        other choice is a list of pairs of bodies, links (body, link) or shapes (body, link, shape), as [(robot, table),
-        ((robot, 8), (robot, 3))]. A list may pair two links of one body, and it ignores collision filters. Bodies and
-        links may be given by their `names`: [("table", "panda/panda_hand")]. A single pair of bodies or names needs no
-        list around it. A body paired with itself means all pairs of its links. ValueError if a body or link is missing.
+        Parameters
+        ----------
+        among : {'simulated', 'all'} or list of pairs, default 'simulated'
+            'simulated': the pairs that the simulator lets collide. 'all': all pairs of different bodies. A list has
+            pairs of bodies, links (body, link) or shapes (body, link, shape), as in [(robot, table), ((robot, 8),
+            (robot, 3))]. It may pair two links of one body, and it ignores collision filters. Bodies and links may be
+            given by their `names`: [("table", "panda/panda_hand")]. A single pair of bodies or names needs no list
+            around it. A body paired with itself means all pairs of its links.
+
+        Returns
+        -------
+        (n, 2) ndarray of int32
+            Indices into `keys`. Each pair occurs once, with the lesser index first. The rows are sorted.
+
+        Raises
+        ------
+        ValueError
+            If `among` names a body or a link that is not in the simulation.
         """
         return self.pairs_at(self.positions, self.orientations, among)
 
     def pairs_at(self, positions: Array, orientations: Array, among: Among = "simulated") -> NDArray[np.int32]:
-        """As `pairs`, with the shapes at `positions` (k, 3) and `orientations` (k, 4), parallel to `keys`."""
+        """Pairs of shapes whose bounding boxes meet at given poses.
+
+        Parameters
+        ----------
+        positions : (k, 3) ndarray
+            Positions of the shapes in the world, m; parallel to `keys`.
+        orientations : (k, 4) ndarray
+            Quaternions x, y, z, w of the shapes; parallel to `keys`.
+        among : {'simulated', 'all'} or list of pairs, default 'simulated'
+            The choice of pairs, as in `pairs`.
+
+        Returns
+        -------
+        (n, 2) ndarray of int32
+            Indices into `keys`, as from `pairs`.
+        """
         asked: Numbered = among if isinstance(among, str) else self._asked_for(among)
         pairs: NDArray[np.int32] = self._layout.batch.candidate_pairs(positions, orientations)
         return np.asarray(pairs[self._pairs.chosen(pairs, asked, self._rules)])
 
     def partners(self) -> dict[tuple[int, int], list[tuple[int, int]]]:
-        """For each link with shapes, by (body, link): the links with shapes that the simulator lets it collide with."""
+        """The links that the simulator lets each link collide with.
+
+        Returns
+        -------
+        dict
+            For each link with shapes, by (body, link): a list of such links.
+        """
         return partners(self._rules, [*self._layout.collider_rows], np.unique(self._layout.colliders))
 
     def report(self) -> Report:
-        """How much of the scene was read, and how much of it the last `overlaps()` looked at.
+        """How much of the scene was read, and how much of it the last `overlaps()` examined.
 
         It asks pybullet for its contact points, which takes about 3 µs for each point.
+
+        Returns
+        -------
+        Report
+            Numbers of bodies, shapes and pairs.
         """
         found, asked, bodies = self._found, self._asked, self._source.bodies
         return Report(
@@ -125,13 +184,35 @@ class AnyBodies:
         )
 
     def link_pairs(self, among: Among = "simulated") -> list[tuple[LinkKey, LinkKey]]:
-        """The pairs of links ((body, link), (body, link)) that `among` chooses, at any poses; sorted."""
+        """The pairs of links that a choice of pairs has, at any poses.
+
+        Parameters
+        ----------
+        among : {'simulated', 'all'} or list of pairs, default 'simulated'
+            The choice of pairs, as in `pairs`.
+
+        Returns
+        -------
+        list of ((body, link), (body, link))
+            The pairs, sorted.
+        """
         asked: Numbered = among if isinstance(among, str) else self._asked_for(among)
         links = [*self._layout.collider_rows]
         return [(links[a], links[b]) for a, b in self._pairs.colliders(asked, self._rules).tolist()]
 
     def mechanics(self) -> Mechanics:
-        """The interface that applies forces to the bodies. ValueError if their simulator takes none."""
+        """The interface that applies forces to the bodies.
+
+        Returns
+        -------
+        Mechanics
+            The interface of the simulator.
+
+        Raises
+        ------
+        ValueError
+            If the simulator accepts no forces.
+        """
         return self._source.mechanics()
 
     def close(self) -> None:

@@ -18,11 +18,17 @@ STATUS = np.array(["separated", "touching", "overlapping"])  # by the numbers of
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Two shapes that overlap or touch; `overlap.status` says which.
+    """Two shapes that overlap or touch; `overlap.status` tells which.
 
-    Bodies (`bodyA`, `bodyB`) and links (`linkA`, `linkB`) are pybullet's indices, and link -1 is the base. Shapes
-    (`shapeA`, `shapeB`) are counted within their link. A is the lesser of the two, and `overlap.shapes[0]` is its
-    shape. `overlap.normal` points from B to A, as pybullet's contactNormalOnB does.
+    Parameters
+    ----------
+    bodyA, linkA, shapeA : int
+        Number of the body, of its link, and of the shape within the link. Link -1 is the base.
+    bodyB, linkB, shapeB : int
+        Those of the second shape. A is the lesser of the two.
+    overlap : Overlap
+        The overlap. `overlap.shapes[0]` is the shape of A. `overlap.normal` points from B to A, as pybullet's
+        contactNormalOnB does.
     """
 
     bodyA: int
@@ -40,12 +46,22 @@ class Contact:
 
 
 class Contacts(Tabular, Sequence[Contact]):
-    """Contacts sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB). Each is made on first access, and kept.
+    """The contacts of a step, sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB), one by one or as arrays.
 
-    `overlaps` has volumes, centroids, normals, depths, gradients and more as arrays, one row per contact, at no extra
-    cost. A slice, a mask or an array of indices picks contacts: `contacts[contacts.overlaps.depth > 1e-3]`. `names` are
-    those of the links, by (body, link), and `kind` is the class of each contact. `to_pandas()` and similar methods make
-    tables with the columns of `overlapper run`, without steps and poses.
+    Each Contact is made at its first use, and kept. A slice, a mask or an array of indices selects contacts, as in
+    `contacts[contacts.overlaps.depth > 1e-3]`. `to_pandas()`, `to_arrow()` and `to_polars()` make tables with the
+    columns of `overlapper run`, without steps and poses.
+
+    Parameters
+    ----------
+    keys : (k, 3) ndarray of int64
+        Body, link and shape of each shape that the pairs of `overlaps` index.
+    overlaps : Overlaps
+        Volumes, centroids, normals, depths, gradients and more as arrays, with a row for each contact.
+    names : dict of (body, link) to str, optional
+        Names of the links.
+    kind : type, default Contact
+        The class of each contact.
     """
 
     __slots__ = ("_keys", "_made", "kind", "names", "overlaps")
@@ -99,7 +115,13 @@ class Contacts(Tabular, Sequence[Contact]):
         return Contacts, (self._keys, self.overlaps, dict(self.names), self.kind)
 
     def columns(self) -> Columns:
-        """The columns of the table by name, each an array or a list with one value per row."""
+        """The columns of the table by name.
+
+        Returns
+        -------
+        dict of str to ndarray or list
+            A value for each row.
+        """
         found = self.overlaps
         keys = self.keys
         columns: Columns = {}

@@ -22,11 +22,19 @@ if TYPE_CHECKING:
 class LinkContact:
     """Two links whose shapes overlap or touch. Its truth value is True only if they overlap.
 
-    `bodyA`, `linkA`, `bodyB` and `linkB` are pybullet's indices, link -1 is the base. `overlap` is the intersection of
-    the unions of their shapes. `contacts` are the pairs of their shapes, and `deepest` is the pair with the largest
-    depth. If only one pair of shapes overlaps, its depth and normal (from B to A) are those of the links. Otherwise
-    the depth is a lower bound of the distance that separates the links, and the normal is a first guess of the
-    direction.
+    If only one pair of shapes overlaps, its depth and normal (from B to A) are those of the links. Otherwise the depth
+    is a lower bound of the distance that separates the links, and the normal is a first guess of the direction.
+
+    Parameters
+    ----------
+    bodyA, linkA : int
+        Number of the body and of its link. Link -1 is the base.
+    bodyB, linkB : int
+        Those of the second link.
+    contacts : tuple of Contact
+        The pairs of their shapes. `deepest` is the pair with the largest depth.
+    overlap : UnionOverlap
+        The intersection of the unions of their shapes.
     """
 
     bodyA: int
@@ -90,8 +98,18 @@ class LinkContact:
 
 
 class LinkContacts(Tabular, list[LinkContact]):
-    """A list of `LinkContact`. `names` are those of the links, by (body, link). `to_pandas()` and similar methods make
-    tables with the columns of `overlapper run --links`, without steps. The area is missing."""
+    """A list of `LinkContact`.
+
+    `to_pandas()`, `to_arrow()` and `to_polars()` make tables with the columns of `overlapper run --per link`, without
+    steps. The area is missing.
+
+    Parameters
+    ----------
+    pairs : iterable of LinkContact
+        The pairs of links.
+    names : dict of (body, link) to str, optional
+        Names of the links.
+    """
 
     __slots__ = ("names",)
 
@@ -100,7 +118,13 @@ class LinkContacts(Tabular, list[LinkContact]):
         self.names = names or {}
 
     def columns(self) -> Columns:
-        """The columns of the table by name, each an array or a list with one value per row."""
+        """The columns of the table by name.
+
+        Returns
+        -------
+        dict of str to ndarray or list
+            A value for each row.
+        """
         columns: Columns = {}
         for side, links in (
             ("A", [(pair.bodyA, pair.linkA) for pair in self]),
@@ -115,7 +139,23 @@ class LinkContacts(Tabular, list[LinkContact]):
 
 
 def link_contacts(contacts: Iterable[Contact]) -> LinkContacts:
-    """The contacts of `Bodies.overlaps` per pair of links, sorted by (bodyA, linkA, bodyB, linkB)."""
+    """The contacts of `Bodies.overlaps`, for each pair of links.
+
+    Parameters
+    ----------
+    contacts : iterable of Contact
+        What `Bodies.overlaps` returns.
+
+    Returns
+    -------
+    LinkContacts
+        Sorted by (bodyA, linkA, bodyB, linkB).
+
+    Raises
+    ------
+    TypeError
+        If `contacts` is something else.
+    """
     if not isinstance(contacts, Iterable):
         raise TypeError(f"contacts must be what Bodies.overlaps() returns, not {contacts!r}")
     ordered = sorted(contacts, key=lambda each: (_solids(each), _shapes(each)))

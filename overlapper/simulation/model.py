@@ -25,8 +25,18 @@ BASE = -1
 class Skipped:
     """Shapes of one link that are not modelled, and why.
 
-    `body` and `link` are pybullet's indices: link -1 is the base, body -1 is a body to which pybullet gives no id.
-    `name` is the name of the link, `reason` is one sentence. `diverged` is True if the body has no finite pose.
+    Parameters
+    ----------
+    body : int
+        Number of the body, -1 for a body to which pybullet gives no id.
+    link : int
+        Number of the link, -1 for the base.
+    name : str
+        Name of the link.
+    reason : str
+        One sentence.
+    diverged : bool, default False
+        True if the body has no finite pose.
     """
 
     body: int
@@ -40,10 +50,22 @@ class Skipped:
 class Decomposed:
     """A concave mesh of one link, modelled as the union of convex parts.
 
-    `body` and `link` are pybullet's indices, link -1 is the base. `name` is the name of the link. `shapes` are the
-    indices of the parts among the shapes of the link. `volume` (m³) is the volume of all parts. `mesh_volume` (m³) is
-    the volume that the mesh bounds, None if its surface is open or turns both ways. `path` is the file of the parts,
-    None if the mesh consisted of convex parts already and they are exact.
+    Parameters
+    ----------
+    body : int
+        Number of the body.
+    link : int
+        Number of the link, -1 for the base.
+    name : str
+        Name of the link.
+    shapes : range
+        Indices of the parts among the shapes of the link.
+    volume : float
+        Volume of all parts, m³.
+    mesh_volume : float or None
+        Volume that the mesh bounds, m³. None if its surface is open or turns both ways.
+    path : Path or None
+        File of the parts. None if the mesh consisted of convex parts already and they are exact.
     """
 
     body: int

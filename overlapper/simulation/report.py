@@ -7,17 +7,31 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """How much of a scene was modelled and measured.
+    """How much of a scene was modelled and measured. Numbers of pairs are those of the last `overlaps()`.
 
-    `bodies` and `shapes` are the numbers in the scene, and `shapes_read` is the number of modelled shapes. The other
-    numbers are those of the last `overlaps()`. `pairs_possible` counts the chosen pairs of modelled shapes, by default
-    those that the simulator lets collide. `pairs_examined` counts the pairs whose boxes meet, and `pairs_overlapping`
-    the pairs that overlap. `pairs_widened` were measured again in wider arithmetic (see `Overlap.widened`).
-    `facets_touched` took part, and `planes_asked` were asked for (see `Overlaps.planes_asked`).
-
-    `pairs_within_margins` counts the chosen pairs of links that have contact points in pybullet but no overlap. The
-    margins that Bullet lays around hulls keep these links apart. With surface="margin" the number is 0: the margins are
-    part of the shapes, so such pairs overlap.
+    Parameters
+    ----------
+    bodies : int
+        Number of bodies in the scene.
+    shapes : int
+        Number of shapes in the scene.
+    shapes_read : int
+        Number of modelled shapes.
+    pairs_possible : int
+        Number of chosen pairs of modelled shapes, by default those that the simulator lets collide.
+    pairs_examined : int
+        Number of these pairs whose bounding boxes meet.
+    pairs_overlapping : int
+        Number of pairs that overlap.
+    pairs_widened : int
+        Number of pairs that were measured again in double-double arithmetic (see `Overlap.widened`).
+    facets_touched : int
+        Number of planes that took part in the measures.
+    planes_asked : int
+        Number of planes that were computed (see `Overlaps.planes_asked`).
+    pairs_within_margins : int, default 0
+        Number of chosen pairs of links that have contact points in pybullet but no overlap. The margins of Bullet keep
+        these links apart. With surface="margin" it is 0: the margins are part of the shapes, so such pairs overlap.
     """
 
     bodies: int

@@ -25,19 +25,34 @@ class Log:
                 bodies.update()
                 log.add(bodies.overlaps())
 
-    `path` ends in .csv, .parquet or .sqlite. Its folder is made if it does not exist. `per` says what a row is about:
-    "shape" for two shapes, or "link" for two links as a whole. With `forces`, the table has columns of forces, which
-    you give to `add`. The heading has the versions of this package and of the simulator, and how `bodies` treats
-    surfaces and concave meshes. `settings` are further entries of the heading, as in
-    `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
-
     A step is on disk when `add` returns. The table grows beside its place, as `run.unfinished.csv`. It moves to its
     place at the end of the `with`, or by `close()`, also if Ctrl-C or sys.exit() ends the loop. After an error, or if
-    the process is killed, it stays where it is. It is then a table like any other, and `unfinished` says where. A
+    the process is killed, it stays where it is. It is then a table like any other, and `unfinished` is its path. A
     Parquet table grows as CSV, too.
 
-    ValueError for another ending or another `per`. TypeError without bodies. OSError if the file cannot be made.
-    ImportError without the library that writes it.
+    Parameters
+    ----------
+    path : str or Path
+        The file, which ends in .csv, .parquet or .sqlite. Its folder is made if it does not exist.
+    bodies : Bodies
+        The bodies of a simulation. The heading has their settings and the versions of package and simulator.
+    per : {'shape', 'link'}, default 'shape'
+        A row is a pair of shapes, or a pair of whole links.
+    forces : bool, default False
+        Whether the table has columns for the forces that `add` takes.
+    **settings : Any
+        Further entries of the heading, as in Log("run.csv", bodies, tolerance=1e-6, mu=0.5).
+
+    Raises
+    ------
+    TypeError
+        If `bodies` is not the Bodies of a simulation.
+    ValueError
+        If the file has another ending, or `per` is unknown.
+    OSError
+        If the file cannot be made.
+    ImportError
+        Without the library that writes the file.
     """
 
     def __init__(
@@ -63,15 +78,29 @@ class Log:
     def add(
         self, contacts: Contacts, step: int | None = None, time: float | None = None, forces: Forces | None = None
     ) -> None:
-        """Write what `bodies.overlaps()` has found. Call it before the next `bodies.update()`.
+        """Write the contacts of a step. Call it before the next `bodies.update()`.
 
-        `forces` are the forces between these bodies, as `VolumetricContact.mean()` returns them. Pairs without forces
-        have empty cells. `step` is by default the one after the last. `time` (s) is by default `step` times the time
-        step of the simulator.
+        Parameters
+        ----------
+        contacts : Contacts
+            What `bodies.overlaps()` returns.
+        step : int, optional
+            Number of the step, larger than the last one. Default: the last one plus 1.
+        time : float, optional
+            Simulated time, s. Default: `step` times the time step of the simulator.
+        forces : Forces, optional
+            Forces between these bodies, as `VolumetricContact.mean()` returns them. Pairs without forces have empty
+            cells.
 
-        ValueError if a step comes no later than the last, if `time` is not finite, or if `contacts` are not of these
-        bodies. ValueError, too, if there are `forces` and no columns for them, or if the log is closed. OSError if the
-        rows cannot be written.
+        Raises
+        ------
+        TypeError
+            If `contacts` is something else.
+        ValueError
+            If `step` is not larger than the last one, `time` is not finite, or `contacts` are of other bodies. Also if
+            there are `forces` but no columns for them, or if the log is closed.
+        OSError
+            If the rows cannot be written.
         """
         if self._table is None:
             raise ValueError(f"this Log is closed: {contacts!r} came too late")

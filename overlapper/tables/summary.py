@@ -24,13 +24,31 @@ Links = tuple[int, int, int, int]  # bodyA, linkA, bodyB, linkB
 
 @dataclass(slots=True)
 class PairSummary:
-    """Two links over a run, by their `names`: in how many `steps` they overlap, and their largest figures.
+    """Two links over a run: the number of steps in which they overlap, and their largest measures.
 
-    - `volume` ± `volume_error`: the largest volume, in m³, in step `volume_step`. It is the volume common to the links
-      as a whole. Where shapes of one link overlap each other, the volume counts once.
-    - `depth`: the largest depth of two of their shapes, in m, in step `depth_step`. `normal` points from the second
-      link to the first.
-    - `force`: the largest force that pushes the two apart, in N, in step `force_step`, with volumetric contact.
+    Parameters
+    ----------
+    names : tuple of (str, str)
+        Names of the two links.
+    steps : int, default 0
+        Number of steps in which they overlap.
+    volume : float, default 0.0
+        Largest common volume of the links as a whole, m³. Where shapes of one link overlap each other, the volume
+        counts once.
+    volume_error : float, default 0.0
+        Error bound of `volume`, m³.
+    volume_step : int, default 0
+        Step of `volume`.
+    depth : float, default 0.0
+        Largest depth of two of their shapes, m.
+    depth_step : int, default 0
+        Step of `depth`.
+    normal : tuple of float, default ()
+        Direction of `depth`, from the second link to the first.
+    force : float, default 0.0
+        Largest force that pushes the two apart, N, with volumetric contact.
+    force_step : int, default 0
+        Step of `force`.
     """
 
     names: tuple[str, str]
@@ -45,7 +63,17 @@ class PairSummary:
     force_step: int = 0
 
     def add(self, step: int, pair: LinkContact, force: float = 0.0) -> None:
-        """Add the overlap of the links in a step, and the force between them."""
+        """Add the overlap of the links in a step, and the force between them.
+
+        Parameters
+        ----------
+        step : int
+            Number of the step.
+        pair : LinkContact
+            The overlap.
+        force : float, default 0.0
+            The force, N.
+        """
         if force > self.force:
             self.force, self.force_step = force, step
         self.steps += 1
@@ -86,10 +114,28 @@ class Disagreement:
 class Summary:
     """The frames of a run, added one by one.
 
-    `scene` is what was run, for `steps` steps and `seconds` of simulated time. `pairs` has a `PairSummary` by (bodyA,
-    linkA, bodyB, linkB). `report` is that of `Bodies`, summed up. `decomposed` is as it is in the end. `skipped` has
-    everything that was left out in any step, with the first such step. If FCL was asked, `verdicts` counts its
-    verdicts, and `disagreements` says where it differs. `forces` says whether there were forces of volumetric contact.
+    Parameters
+    ----------
+    scene : str
+        Name of what was run.
+    steps : int, default 0
+        Number of steps.
+    seconds : float, default 0.0
+        Simulated time, s.
+    pairs : dict of (bodyA, linkA, bodyB, linkB) to PairSummary
+        The pairs of links that overlap in any step.
+    report : Report, optional
+        The sum of the reports of all steps.
+    skipped : dict of Skipped to int
+        Everything that was left out in any step, with the first such step.
+    decomposed : list of Decomposed
+        The concave meshes at the end.
+    verdicts : Counter of str
+        Numbers of verdicts of FCL, if FCL was asked.
+    disagreements : list of Disagreement
+        The contacts where FCL differs.
+    forces : bool, default False
+        Whether there were forces of volumetric contact.
     """
 
     scene: str
@@ -104,7 +150,15 @@ class Summary:
     forces: bool = False
 
     def add(self, frame: Frame[AnyBodies], opinions: Sequence[Comparison] = ()) -> None:
-        """Add a frame. `opinions` are FCL's of its contacts, if it was asked."""
+        """Add a frame.
+
+        Parameters
+        ----------
+        frame : Frame
+            Bodies and contacts of a step.
+        opinions : sequence of Comparison, default ()
+            Comparisons of its contacts with FCL, if FCL was asked.
+        """
         self.steps, self.seconds = frame.step, frame.time
         self.report = _sum(self.report, frame.bodies.report())
         note_skipped(self.skipped, frame)
@@ -125,11 +179,23 @@ class Summary:
             self.disagreements.append(Disagreement(step, names, opinion.verdict, opinion.explanation))
 
     def largest(self) -> list[PairSummary]:
-        """Return the pairs that overlap in any step, the largest volume first."""
+        """The pairs that overlap in any step.
+
+        Returns
+        -------
+        list of PairSummary
+            The largest volume first.
+        """
         return sorted(self.pairs.values(), key=lambda pair: -pair.volume)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything as JSON takes it. Values are in SI units, and the names say the unit."""
+        """Everything as JSON takes it.
+
+        Returns
+        -------
+        dict
+            Values are in SI units. The names of the entries end in the unit.
+        """
         return {
             "scene": self.scene,
             "steps": self.steps,

@@ -36,9 +36,19 @@ FORCES = "/overlapper/forces"
 class Viewer:
     """A live view of a simulation: call `show` after each step.
 
-    A visualizer that is passed in keeps its own camera, lights and background. Otherwise a meshcat server is started at
-    the address `url`, and the bodies of the first `show` are framed. `close`, or the end of a `with` block, stops the
-    server. The view is visible only on this machine, unless `host` is another address of it, or "0.0.0.0" for all.
+    Without `visualizer`, a meshcat server is started at the address `url`, and the bodies of the first `show` are
+    framed. `close`, or the end of a `with` block, stops the server.
+
+    Parameters
+    ----------
+    visualizer : meshcat.Visualizer, optional
+        A visualizer to draw in. It keeps its own camera, lights and background.
+    bodies : Look
+        How bodies are drawn.
+    overlaps : Look
+        How overlaps are drawn.
+    host : str, default '127.0.0.1'
+        Address of this machine for the server. "0.0.0.0" shows the view to the network.
     """
 
     def __init__(
@@ -72,9 +82,16 @@ class Viewer:
         return str(self.visualizer.url())
 
     def show(self, bodies: DrawnBodies, contacts: Iterable[DrawnContact], forces: Forces | None = None) -> None:
-        """Draw the bodies where they are now, the overlapping pairs among `contacts`, and their `forces`.
+        """Draw the bodies where they are now, with their overlaps. This replaces the earlier drawing.
 
-        This replaces the earlier drawing.
+        Parameters
+        ----------
+        bodies : Bodies
+            The bodies.
+        contacts : iterable of Contact
+            Those that overlap are drawn.
+        forces : Forces, optional
+            Forces to draw.
         """
         contacts = list(contacts)
         if self._stage is None or self._framing is None:

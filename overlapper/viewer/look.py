@@ -43,12 +43,32 @@ MANY_FACETS = 100  # polytopes with more facets stand for round overlaps
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How each body or overlap is drawn: its `faces`, `edges` and `vertices`.
+    """How each body or overlap is drawn.
 
-    `opacity`, from 0 to 1, is that of the faces. `front` and `back` are the colours of faces seen from outside and from
-    inside, written #rrggbb. Without `front`, each has its own colour. Without `back`, the inside of overlaps has a
-    darker shade of their colour, and the inside of bodies is not drawn. `marks` are the patch outline and the normal of
-    an overlap. With `forces`, if there are any, arrows replace normals, and pressures replace the colours of overlaps.
+    Parameters
+    ----------
+    faces : bool, default True
+        Whether faces are drawn.
+    edges : bool, default True
+        Whether edges are drawn.
+    vertices : bool, default False
+        Whether vertices are drawn.
+    opacity : float, default 1.0
+        Opacity of the faces, from 0 to 1.
+    front : str, optional
+        Colour of faces from outside, as #rrggbb. Default: each body or overlap has its own colour.
+    back : str, optional
+        Colour of faces from inside, as #rrggbb. Default: the inside of overlaps has a darker shade of their colour, and
+        the inside of bodies is not drawn.
+    marks : bool, default True
+        Whether the patch outline and the normal of an overlap are drawn.
+    forces : bool, default True
+        Whether forces, if there are any, are drawn: arrows replace normals, and pressures replace colours of overlaps.
+
+    Raises
+    ------
+    ValueError
+        If `opacity` or a colour is invalid.
     """
 
     faces: bool = True

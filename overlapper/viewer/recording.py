@@ -80,6 +80,13 @@ class Recording:
     overlaps drawn. `recording.html#t=0.25` opens at that time, paused. `#t=0.25&from=1,0,1&at=0,0,0.5` also puts the
     camera at the point `from`, and turns it to the point `at`. `#t=0.25&pair=cup,hand` also shows the numbers of that
     pair. About 30 frames per second are enough for a smooth view.
+
+    Parameters
+    ----------
+    bodies : Look
+        How bodies are drawn.
+    overlaps : Look
+        How overlaps are drawn.
     """
 
     def __init__(self, bodies: Look = BODIES, overlaps: Look = OVERLAPS) -> None:
@@ -116,10 +123,28 @@ class Recording:
         name: str = "",
         forces: Forces | None = None,
     ) -> None:
-        """Record the bodies where they are now and the overlapping pairs among `contacts`, with their `forces`.
+        """Record the bodies where they are now, with their overlaps.
 
-        `time` in seconds must increase from call to call, and the page counts from the first. Frames with a `name` are
-        not moments of one run: the page shows the names instead of the times.
+        Parameters
+        ----------
+        bodies : Bodies
+            The bodies.
+        contacts : iterable of Contact
+            Those that overlap are drawn.
+        time : float
+            Simulated time, s. It must increase from call to call. The page counts from the first.
+        name : str, default ''
+            Name of the frame. Frames with a name are not moments of one run: the page shows the names instead of the
+            times.
+        forces : Forces, optional
+            Forces to draw.
+
+        Raises
+        ------
+        TypeError
+            If `time` is not a number.
+        ValueError
+            If `time` is not later than that of the frame before.
         """
         if not isinstance(time, Real):
             raise TypeError(f"time must be a number of seconds, not {time!r}")
@@ -165,7 +190,23 @@ class Recording:
         return f"Recording({len(self._times)} frames{until}, {len(self._pairs)} pairs)"
 
     def save(self, path: str | Path) -> Path:
-        """Write the frames added so far to one HTML file, and return its path."""
+        """Write the frames added so far to one HTML file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Path
+            The path of the file.
+
+        Raises
+        ------
+        ValueError
+            If there are no frames.
+        """
         text = self._page(Path(path).stem)
         with beside(path) as file:
             file.write_text(text, encoding="utf-8")

@@ -94,7 +94,7 @@ inline constexpr std::tuple kColumns{
                         "(p,) Overlaps.SEPARATED (0), TOUCHING (1) or OVERLAPPING (2)."},
     Column<std::int8_t>{"way", &Overlaps::way,
                         [](const Overlaps::Row& row) { return static_cast<std::int8_t>(row.measures.way); },
-                        "(p,) how the answer came: a place in Overlaps.WAYS, which has the names of Overlap.way."},
+                        "(p,) how the result was computed: an index into Overlaps.WAYS, which has the names of Overlap.way."},
     Column<double>{"volume", &Overlaps::volume, [](const Overlaps::Row& row) { return row.measures.volume; },
                    "(p,) m³; 0 unless overlapping."},
     Column<double>{"volume_error", &Overlaps::volume_error,
@@ -102,23 +102,23 @@ inline constexpr std::tuple kColumns{
                    "(p,) m³, certified: the true volume is within volume ± volume_error."},
     Column<Vec3>{"centroid", &Overlaps::centroid,
                  [](const Overlaps::Row& row) { return centroid_or_nan(row.measures); },
-                 "(p, 3) centre of the common volume, m; not a number unless overlapping."},
+                 "(p, 3) centre of the common volume, m; NaN unless overlapping."},
     Column<double>{"area", &Overlaps::area, [](const Overlaps::Row& row) { return row.measures.area; },
                    "(p,) m², of the surface of the common polytope."},
     Column<Vec3>{"normal", &Overlaps::normal, [](const Overlaps::Row& row) { return row.normal; },
                  "(p, 3) unit, from b to a as pybullet's contactNormalOnB; 0 for pairs that are separated."},
     Column<double>{"depth", &Overlaps::depth, [](const Overlaps::Row& row) { return row.depth; },
-                   "(p,) m, the least translation that separates the pair, of a along normal; 0 unless overlapping."},
+                   "(p,) m, length of the shortest translation that separates the pair; 0 unless overlapping."},
     Column<BodyGradients>{
         "gradient", &Overlaps::gradient, [](const Overlaps::Row& row) { return gradients(row.measures); },
         R"((p, 2, 6) d volume / d (translation, rotation vector about the body's own position) of a and of b, m² and m³;
 0 unless overlapping.)"},
     Column<int>{"facets_touched", &Overlaps::facets_touched,
                 [](const Overlaps::Row& row) { return row.measures.facets_touched; },
-                "(p,) how many planes of the shapes took part in building the polytope."},
+                "(p,) number of planes of the shapes that took part in the measures."},
     Column<char>{"widened", &Overlaps::widened,
                  [](const Overlaps::Row& row) { return static_cast<char>(overlapper::widened(row.measures.way)); },
-                 "(p,) True where the volume was computed again in wider arithmetic."}};
+                 "(p,) True where the volume was computed again in double-double arithmetic."}};
 
 /// The pairs of moving shapes. Results of the last call are reused if they prove the same answer. Several threads may
 /// call it at once. One thread uses the memory, and the others work without it.

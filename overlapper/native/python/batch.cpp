@@ -166,15 +166,14 @@ void define_columns(nb::class_<Overlaps>& cls) {
       },
       nb::rv_policy::reference, nb::sig("def patch_area(self) -> numpy.typing.NDArray[numpy.float64]"),
       "(p, 3) m², the area vector of the patch, from b to a; zeros unless overlapping.");
-  define_patch_column(
-      cls, "patch_centre", &Overlaps::Patches::centre,
-      R"((p, 3) m, the centre of that area in the plane through the centroid; not a number without an area. It, the
-moments and the distance take some microseconds a pair when one of them is first asked for.)");
+  define_patch_column(cls, "patch_centre", &Overlaps::Patches::centre,
+                      R"((p, 3) m, the centre of that area in the plane through the centroid; NaN without an area. The
+first use of the centre, the moments or the distance takes some microseconds for each pair.)");
   define_patch_column(cls, "patch_moments", &Overlaps::Patches::moments,
                       "(p, 3, 3) m⁴, ∫ x xᵀ dA of that area about its centre; zeros without an area.");
   define_patch_column(
       cls, "patch_distance", &Overlaps::Patches::distance,
-      R"((p,) m, how far points of that area are on the average from the centroid, seen along the area vector; not a number
+      R"((p,) m, mean distance of the points of that area from the centroid, seen along the area vector; NaN
 without an area.)");
 }
 
@@ -231,13 +230,13 @@ void set_state(Overlaps& self, nb::handle state) {
 }
 
 void define_overlaps_class(nb::module_& m) {
-  nb::class_<Overlaps> cls(
-      m, "Overlaps",
-      R"(What many pairs of shapes share: an array per quantity, a row per pair. SI units, world coordinates.
+  nb::class_<Overlaps> cls(m, "Overlaps",
+                           R"(Overlaps of many pairs of shapes: an array for each quantity, with a row for each pair.
 
-The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again
-unless it took long and its Batch has not been asked since; `overlaps[mask]`, a slice or an array of indices picks rows.
-A pickle has the shapes and their poses, of which the rows are computed again, to the same bits.)");
+Units are SI. Coordinates are world coordinates. The arrays are read-only views. `overlaps[i]` is the Overlap of row i,
+with all its quantities. It is computed again, unless that took long and its Batch was not called since.
+`overlaps[mask]`, a slice or an array of indices selects rows. A pickle has the shapes and poses. The rows are computed
+again from them, bit-identically.)");
   define_columns(cls);
   for (const auto& [name, status] : {std::pair{"SEPARATED", Status::kSeparated},
                                      {"TOUCHING", Status::kTouching},
@@ -246,11 +245,12 @@ A pickle has the shapes and their poses, of which the rows are computed again, t
   nb::list ways;
   for (const char* way : kWayNames) ways.append(way);
   cls.attr("WAYS") = nb::tuple(ways);
-  cls.def_ro("examined", &Overlaps::examined, "How many pairs were looked at: those given, or those whose boxes meet.");
+  cls.def_ro("examined", &Overlaps::examined,
+             "Number of pairs that were examined: the given pairs, or those whose bounding boxes meet.");
   cls.def_ro(
       "planes_asked", &Overlaps::planes_asked,
-      R"(How many planes of the shapes were asked for in that call: placed to be held against corners, or given by a shape
-as an answer to where a ray leaves it or which of its planes is tightest about a point.)");
+      R"(Number of planes of the shapes that the call computed: to compare with vertices, to find where a ray leaves a
+shape, or to find the plane nearest to a point.)");
   cls.def_ro("tolerance", &Overlaps::tolerance);
   cls.def_prop_ro("method", &method_name, nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
   cls.def("__len__", &Overlaps::size);
@@ -278,28 +278,77 @@ as an answer to where a ray leaves it or which of its planes is tightest about a
 /// The type of a sequence of shapes in signatures.
 std::string any_shapes() { return "collections.abc.Sequence[" + any_shape() + "]"; }
 
-constexpr const char* kOverlapsDoc =
-    R"(What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
-gradient as arrays.
+constexpr const char* kPosesDoc =
+    R"(positions : (k, 3) array_like
+    Positions of the shapes, m.
+orientations : (k, 4) array_like
+    Quaternions x, y, z, w of the shapes, of any length but 0.
+)";
 
-`positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs`
-(p, 2) indexes them and has a row each in the answer, or with separated=False only those that overlap or touch; without
-it there is a row for each pair that overlaps or touches, found by a tree of boxes and sorted. `tolerance` and `method`
-are those of `overlap`, whose answers these are to the last bit. The work is spread over `threads`, None being all that
-there are; their number does not change a bit of the answer.
+constexpr const char* kRestOfOverlapsDoc =
+    R"(pairs : (p, 2) array_like of int, optional
+    Indices of the shapes of each pair. Default: all pairs that overlap or touch, sorted.
+tolerance : float, default 0.001
+    Allowed relative error of the volume for curved shapes, between 0 and 1. Polyhedra are exact and ignore it.
+threads : int or None, default 1
+    Number of threads. None: one on each core. The number does not change a bit of the results.
+method : {'auto', 'paper'}, default 'auto'
+    Method of computation, as in `overlap`.
+separated : bool, default True
+    Whether `pairs` that are separated have rows, too.
 
-Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
-Raises ValueError naming an argument of the wrong shape, a pose that is not finite, or half-spaces whose common set is
-unbounded.)";
+Returns
+-------
+Overlaps
+    A row for each pair, bit-identical to what `overlap` returns for the pair.
+
+Raises
+------
+ValueError
+    If an argument has the wrong shape, a pose is not finite, or half-spaces have an unbounded common set.
+KeyboardInterrupt
+    After Ctrl-C. Its attribute `overlaps` has the rows that were finished.)";
+
+/// The docstring of `overlaps`; `shapes` are the lines of that argument, if it has it.
+std::string overlaps_doc(const char* shapes) {
+  return std::string(
+             "Overlaps of many pairs of placed shapes in one call, as arrays. Other Python threads run "
+             "meanwhile.\n\nParameters\n----------\n") +
+         shapes + kPosesDoc + kRestOfOverlapsDoc;
+}
+
+/// The docstring of `candidate_pairs`, likewise.
+std::string candidates_doc(const char* shapes) {
+  return std::string(
+             "Pairs of shapes whose bounding boxes in the world meet.\n\nA half-space meets a box that reaches into "
+             "it. "
+             "Two half-spaces are not a pair.\n\nParameters\n----------\n") +
+         shapes + kPosesDoc +
+         "\nReturns\n-------\n(p, 2) ndarray of int32\n    Indices i < j of the two shapes, sorted.";
+}
+
+constexpr const char* kShapesDoc = "shapes : sequence of shapes\n    The k shapes, without poses.\n";
 
 void define_batch_class(nb::module_& m) {
   nb::class_<Batch> cls(m, "Batch",
-                        R"(Shapes that are asked for their overlaps again and again as they move.
+                        R"(Shapes whose overlaps are measured again and again while they move.
 
-`overlaps` is the function of that name for these shapes. What it finds is kept for its next call: pairs of which
-neither has moved by a bit cost nothing, and pairs that are still apart along the same axis next to nothing. The
-answers are those of a first call to the last bit. Threads that ask at the same time get their answers without waiting.
-A pickle has the shapes alone.)");
+Results are reused in the next call. A pair whose poses are bit-identical costs no time. A pair that is still separated
+along the same axis costs little time. All results are bit-identical to those of a first call. Several threads may call
+at the same time. A pickle has only the shapes.
+
+Parameters
+----------
+shapes : sequence of shapes
+    The k shapes, without poses.
+
+Examples
+--------
+>>> from overlapper import Batch, Sphere
+>>> batch = Batch([Sphere(0.5), Sphere(0.5)])
+>>> found = batch.overlaps([[0, 0, 0], [0.5, 0, 0]], [[0, 0, 0, 1], [0, 0, 0, 1]])
+>>> found.pairs.tolist(), found.volume.round(6).tolist()
+([[0, 1]], [0.163625]))");
   cls.def(
       "__init__", [](Batch* self, nb::handle shapes) { new (self) Batch(to_shapes(shapes)); }, "shapes"_a.none(),
       nb::sig(("def __init__(self, shapes: " + any_shapes() + ") -> None").c_str()));
@@ -320,12 +369,10 @@ A pickle has the shapes alone.)");
           nb::sig("def overlaps(self, " OVERLAPPER_POSES ", pairs: numpy.typing.ArrayLike | None = None, "
                   "tolerance: float = 0.001, threads: int | None = 1, "
                   "method: typing.Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps"),
-          kOverlapsDoc);
-  cls.def(
-      "candidate_pairs", &candidates, "positions"_a.none(), "orientations"_a.none(),
-      nb::sig("def candidate_pairs(self, " OVERLAPPER_POSES ") -> numpy.typing.NDArray[numpy.int32]"),
-      R"((p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
-two half-spaces are no pair.)");
+          overlaps_doc("").c_str());
+  cls.def("candidate_pairs", &candidates, "positions"_a.none(), "orientations"_a.none(),
+          nb::sig("def candidate_pairs(self, " OVERLAPPER_POSES ") -> numpy.typing.NDArray[numpy.int32]"),
+          candidates_doc("").c_str());
 }
 
 }  // namespace
@@ -347,7 +394,7 @@ void define_batch(nb::module_& m) {
                ", pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, "
                "method: typing.Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps")
                   .c_str()),
-      kOverlapsDoc);
+      overlaps_doc(kShapesDoc).c_str());
   m.def(
       "candidate_pairs",
       [](nb::handle shapes, nb::handle positions, nb::handle orientations) {
@@ -358,8 +405,7 @@ void define_batch(nb::module_& m) {
       nb::sig(("def candidate_pairs(shapes: " + any_shapes() +
                ", " OVERLAPPER_POSES ") -> numpy.typing.NDArray[numpy.int32]")
                   .c_str()),
-      R"((p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
-two half-spaces are no pair.)");
+      candidates_doc(kShapesDoc).c_str());
 }
 
 }  // namespace overlapper::python

@@ -124,15 +124,16 @@ void define_contact(nb::class_<Overlap>& cls) {
   const nb::sig vector_or_none_normal("def normal(self) -> numpy.typing.NDArray[numpy.float64] | None");
   contact_property(
       cls, "normal", always, [](const Contact& c) { return to_numpy(c.normal); }, vector_or_none_normal,
-      R"((3,) unit, from b to a as pybullet's contactNormalOnB: moving a by depth * normal separates an overlapping
-pair. Also given for pairs that touch or are apart. None for three or more bodies.)");
+      R"((3,) unit vector from b to a, as pybullet's contactNormalOnB. Moving a by depth * normal separates an overlapping
+pair. Pairs that touch or are separated have a normal, too. None for three or more bodies.)");
   contact_property(
       cls, "depth", always, [](const Contact& c) { return c.depth; }, nb::sig("def depth(self) -> float | None"),
-      "m, the least translation that separates the pair; 0 unless overlapping. None for three or more bodies.");
+      "m, length of the shortest translation that separates the pair; 0 unless overlapping. None for three or more "
+      "bodies.");
   contact_property(
       cls, "distance", always, [](const Contact& c) { return c.distance; },
       nb::sig("def distance(self) -> float | None"),
-      "m between the nearest points; 0 unless separated. None for three or more bodies.");
+      "m, between the nearest points; 0 unless separated. None for three or more bodies.");
   contact_property(
       cls, "witness_a", apart, [](const Contact& c) { return to_numpy(c.witness_a); },
       nb::sig("def witness_a(self) -> numpy.typing.NDArray[numpy.float64] | None"),
@@ -158,16 +159,15 @@ void define_measures(nb::class_<Overlap>& cls) {
       "volume_error", [](const Overlap& o) { return computed(o, &Overlap::volume_error); },
       R"(m³, certified: the true volume is within volume ± volume_error.
 
-For polyhedra it bounds the rounding: every plane moved by 16 half-ulps of the coordinates' magnitude, times the
-area. Where a formula gives the measures of a pair with a round body, it is that, too; where slices do, what is left of
-the series over them, the rounding of their lines, and what area vectors, which sum to zero over a closed surface, leave
-open. For others with smooth shapes it is the share of the volume between an outer and an inner polytope, plus that. A
-pair that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
-difference from what 'auto' finds, plus the error of that. 0 if separated.)");
+For polyhedra and formulas it bounds the rounding errors: every plane is moved by 16 half-ulps of the coordinates'
+magnitude, times the area. For slices it is the remainder of the series, the rounding errors of their lines, and the sum
+of the area vectors, which is zero for a closed surface. For other curved shapes it is the volume between an outer and an
+inner polytope, plus rounding errors. A pair that touches may have a volume of the size of rounding errors. For method
+'paper' it is the difference from the volume of 'auto', plus the error bound of 'auto'. 0 if separated.)");
   cls.def_prop_ro(
       "widened", [](const Overlap& o) { return measured(o).widened(); },
-      R"(True if double arithmetic could not place the volume within 1e-12 of itself, and it was computed again in wider
-arithmetic from the shapes' own numbers, as were centroid, area, inertia and gradient.)");
+      R"(True if double arithmetic could not bound the relative error of the volume by 1e-12. Volume, centroid, area,
+inertia and gradient were then computed again in double-double arithmetic, from the shapes as given.)");
   cls.def_prop_ro(
       "area", [](const Overlap& o) { return measured(o).area(); },
       "m², of the surface of the common set; 0 unless overlapping.");
@@ -216,21 +216,21 @@ nb::object if_solid(const ErrorsOf& e, double error) { return e.solid ? nb::obje
 
 void define_errors(nb::module_& m) {
   nb::class_<ErrorsOf> cls(m, "Errors",
-                           R"(How far the figures of an Overlap may be off: bounds that hold, in the same units.
+                           R"(Error bounds of the quantities of an Overlap, in the same units. They are certified.
 
-They rest on another way to the same figures, whose rounding is bounded from its operations, and on how far that and the
-figures are apart.)");
+Each quantity is computed in a second way, with bounds of its rounding errors. The error bound is the difference of the
+two results, plus the bound of the second way.)");
   cls.def_prop_ro("volume", [](const ErrorsOf& e) { return e.errors.volume; }, "m³, the same as `volume_error`.");
   cls.def_prop_ro("area", [](const ErrorsOf& e) { return e.errors.area; }, "m².");
   cls.def_prop_ro(
       "centroid", [](const ErrorsOf& e) { return if_solid(e, e.errors.centroid); },
       nb::sig("def centroid(self) -> float | None"),
-      "m: the true centroid is no farther away. None unless overlapping.");
-  cls.def_prop_ro("inertia", [](const ErrorsOf& e) { return e.errors.inertia; }, "m⁵, of each entry.");
+      "m, largest distance of the true centroid. None unless overlapping.");
+  cls.def_prop_ro("inertia", [](const ErrorsOf& e) { return e.errors.inertia; }, "m⁵, for each entry.");
   cls.def_prop_ro(
       "vertices", [](const ErrorsOf& e) { return if_solid(e, e.errors.vertices); },
       nb::sig("def vertices(self) -> float | None"),
-      R"(m: no point of the hull of the vertices is farther from the common set, and none of that from the hull. None unless
+      R"(m, largest distance between the hull of the vertices and the common set (Hausdorff distance). None unless
 overlapping.)");
   array_property(
       cls, "gradient",
@@ -240,21 +240,22 @@ overlapping.)");
           values.insert(values.end(), {force, force, force, moment, moment, moment});
         return to_numpy<Matrix>(std::move(values), {e.errors.gradient.size(), 6});
       },
-      R"((m, 6) m² and m³: of the length of the three numbers that they stand for, and so of each.
+      R"((m, 6) m² and m³. Each bounds the length of the error of three entries, and so the error of each entry.
 
-Where facets of two bodies lie in one plane the volume has a slope to one side and another to the other, and what is
-stated may be either: the error is then as large as the facet. Where surfaces are tangent, or nearly, rounding moves the
-border between them by far more than itself.)");
+Where facets of two bodies lie in one plane, the volume has two one-sided derivatives, and the gradient may be either.
+The error bound is then as large as the facet. Where surfaces are nearly tangent, rounding errors move the border between
+them much farther than their own size.)");
   cls.def_prop_ro(
       "depth", [](const ErrorsOf& e) { return of_contact(e, &ContactErrors::depth); },
-      nb::sig("def depth(self) -> float | None"), "m. None for three or more bodies, as are the next two.");
+      nb::sig("def depth(self) -> float | None"),
+      "m. None for three or more bodies. The same holds for `distance` and `witnesses`.");
   cls.def_prop_ro(
       "distance", [](const ErrorsOf& e) { return of_contact(e, &ContactErrors::distance); },
       nb::sig("def distance(self) -> float | None"), "m.");
   cls.def_prop_ro(
       "witnesses", [](const ErrorsOf& e) { return of_contact(e, &ContactErrors::witnesses); },
       nb::sig("def witnesses(self) -> float | None"),
-      R"(m: by how much, both together, the witnesses are outside of their bodies and farther apart than the bodies are. 0 if
+      R"(m, sum of the distances of the witness points from their bodies and of the error of their distance. 0 if
 overlapping.)");
   cls.def("__repr__", [](const ErrorsOf& e) { return repr(e); });
 }
@@ -263,7 +264,7 @@ void define_boundary(nb::class_<Overlap>& cls) {
   array_property(
       cls, "vertices",
       [](const Overlap& o) { return solid(o) ? to_numpy(computed(o, &Overlap::boundary).vertices) : empty_rows(3); },
-      "(n, 3) corners of the common polytope, m; empty unless overlapping.");
+      "(n, 3) vertices of the common polytope, m; empty unless overlapping.");
   array_property(
       cls, "faces",
       [](const Overlap& o) {
@@ -290,7 +291,7 @@ void define_boundary(nb::class_<Overlap>& cls) {
       [](const Overlap& o) {
         return to_numpy(std::span<const int>(solid(o) ? computed(o, &Overlap::boundary).owner : std::vector<int>{}));
       },
-      "(f,) which of the shapes each facet belongs to.");
+      "(f,) index of the shape that each facet belongs to.");
   cls.def_prop_ro(
       "patch",
       [](const Overlap& o) {
@@ -301,34 +302,35 @@ void define_boundary(nb::class_<Overlap>& cls) {
         return list;
       },
       nb::sig("def patch(self) -> list[numpy.typing.NDArray[numpy.float64]]"),
-      R"(Closed polygons (k, 3) along the ridges where the owner changes, the first point not repeated. For a pair they go
-counter-clockwise around a's part of the surface; for more bodies, around the part of each.)");
+      R"(Closed polygons (k, 3) along the edges where the owner changes, m. The first point is not repeated. For a pair,
+they go counter-clockwise around a's part of the surface. For more bodies, they go around the part of each.)");
   const auto has_area = [](const Overlap& o) { return !std::isnan(computed(o, &Overlap::patch).distance); };
   patch_property(
       cls, "patch_area", [](const Overlap&) { return true; }, [](const Patch& p) { return to_numpy(p.area); },
       nb::sig("def patch_area(self) -> numpy.typing.NDArray[numpy.float64] | None"),
-      R"((3,) m², the area vector of b's part of the surface, which points to a as `normal` does: its length is the area within
-`patch`, seen along it, and for small overlaps what the volume grows by per metre of depth. The same as gradient[1, :3],
-and opposite to gradient[0, :3]; zeros unless overlapping. None for three or more bodies, as are the next three.)");
+      R"((3,) m², the area vector of b's part of the surface. It points to a, as `normal` does. Its length is the area within
+`patch`, projected along it. For small overlaps it is the derivative of the volume by the depth. It equals
+gradient[1, :3] and -gradient[0, :3]. Zeros unless overlapping. None for three or more bodies. The same holds for
+`patch_centre`, `patch_moments` and `patch_distance`.)");
   patch_property(
       cls, "patch_centre", has_area, [](const Patch& p) { return to_numpy(p.centre); },
       nb::sig("def patch_centre(self) -> numpy.typing.NDArray[numpy.float64] | None"),
-      R"((3,) m, the centre of that area, in the plane through the centroid of the volume. None, too, without an area: unless
-the bodies overlap, and of a body inside the other.)");
+      R"((3,) m, the centre of that area, in the plane through the centroid of the volume. None also without an area: if the
+bodies do not overlap, or one body is inside the other.)");
   patch_property(
       cls, "patch_moments", [](const Overlap&) { return true; }, [](const Patch& p) { return to_numpy(p.moments); },
       nb::sig("def patch_moments(self) -> numpy.typing.NDArray[numpy.float64] | None"),
-      R"((3, 3) m⁴, ∫ x xᵀ dA of that area about its centre, world axes; nothing along the area vector. Its eigenvectors and the
-roots of its eigenvalues over the area are the axes of the patch and its radii of gyration. Where formulas or slices
-measure round bodies it is that of the round patch, not of polygons.)");
+      R"((3, 3) m⁴, ∫ x xᵀ dA of that area about its centre, world axes; zero along the area vector. Its eigenvectors are the
+axes of the patch. The square roots of its eigenvalues divided by the area are the radii of gyration. Where formulas or
+slices measure round bodies, it is that of the round patch, not of polygons.)");
   patch_property(
       cls, "patch_distance", has_area, [](const Patch& p) { return p.distance; },
       nb::sig("def patch_distance(self) -> float | None"),
-      R"(m, how far the points of that area are on the average from the centroid of the volume, in the plane through it:
-with friction mu and a normal force N, the torque that resists spinning is at most mu * N * patch_distance. Exact of
-polyhedra, discs and ellipses. Where formulas or slices measure round bodies, other patches count as the ellipse that
-has the same centre and moments: of a long rectangle that is 2 % less than the truth, of a stadium within 1 %, of a half
-disc within 2 %, of a triangle 2 % more, and of a thin ring 6 % less. None without an area, as the centre.)");
+      R"(m, mean distance of the points of that area from the centroid of the volume, in the plane through it. With friction
+mu and a normal force N, the torque that resists spinning is at most mu * N * patch_distance. It is exact for polyhedra,
+discs and ellipses. Where formulas or slices measure round bodies, other patches count as the ellipse with the same
+centre and moments. That is 2 % too small for a long rectangle, within 1 % for a stadium, within 2 % for a half disc,
+2 % too large for a triangle, and 6 % too small for a thin ring. None without an area.)");
   cls.def_prop_ro(
       "bounds",
       [](const Overlap& o) -> nb::object {
@@ -350,14 +352,14 @@ std::string signature_of_way() {
 
 void define_overlap(nb::module_& m) {
   nb::class_<Overlap> cls(m, "Overlap",
-                          R"(What two or more convex shapes share. True only if they overlap.
+                          R"(The common set of two or more convex shapes. True only if they overlap.
 
-Immutable; each quantity is computed when first asked for. SI units, world coordinates. For smooth shapes the
-polytope contains the common set, as closely as `tolerance` asks.)");
+An Overlap is immutable. Each quantity is computed at its first use. Units are SI. Coordinates are world coordinates. For
+curved shapes, the polytope contains the common set, and is as close to it as `tolerance` demands.)");
   cls.def_prop_ro(
       "status", [](const Overlap& o) { return status_name(o.status()); },
       nb::sig("def status(self) -> typing.Literal['separated', 'touching', 'overlapping']"),
-      "'touching' if rounding cannot tell whether the common set has an inside.");
+      "'touching' if rounding errors leave open whether the common set has a volume.");
   cls.def("__bool__", [](const Overlap& o) { return solid(o); });
   cls.def_prop_ro(
       "shapes",
@@ -370,23 +372,23 @@ polytope contains the common set, as closely as `tolerance` asks.)");
   cls.def_prop_ro("tolerance", &Overlap::tolerance, "Allowed relative error of the volume for curved shapes.");
   cls.def_prop_ro(
       "converged", [](const Overlap& o) { return measured(o).converged(); },
-      R"(False if the volume may be off by more than the fraction `tolerance`: where rounding, or the most planes that a
-smooth shape is given, leave more in doubt. True of bodies that do not overlap.)");
+      R"(Whether the relative error of the volume is at most `tolerance`. It may be larger by rounding errors, or by the
+limit on the number of planes of a curved shape. True for bodies that do not overlap.)");
   cls.def_prop_ro(
       "method", [](const Overlap& o) { return o.method() == Method::kAuto ? "auto" : "paper"; },
       nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
   cls.def_prop_ro(
       "way", [](const Overlap& o) { return name(measured(o).way()); }, nb::sig(signature_of_way().c_str()),
-      R"(How the answer came: by which way the volume was measured, or the status found of bodies that do not overlap.
+      R"(How the result was computed: the way that found the volume, or the status of bodies that do not overlap.
 
-'separation': doubles prove a gap. 'clipping': corners of each body held against the planes of the other. 'tracing': the
-seam of two surfaces followed from facet to facet. 'closed form': a formula. 'slicing': slices of
-round bodies, integrated. 'dual hull': the convex hull of dual points. 'wide ...': the same in double-doubles, where doubles are not
-enough. 'doubt': not even these tell whether there is an inside, so that the bodies are said to touch. 'paper': the
-method asked for.)");
+'separation': doubles prove a gap. 'clipping': the vertices of each body are compared with the planes of the other.
+'tracing': the curve where two surfaces meet is followed from facet to facet. 'closed form': a formula. 'slicing':
+integrated slices of round bodies. 'dual hull': the convex hull of dual points. 'wide ...': the same in double-double
+arithmetic, where doubles are not accurate enough. 'doubt': double-doubles leave open whether there is a common volume,
+so the status is 'touching'. 'paper': the method `paper`.)");
   cls.def_prop_ro(
       "facets_touched", [](const Overlap& o) { return computed(o, &Overlap::facets_touched); },
-      "How many planes of the shapes took part in the measures.");
+      "Number of planes of the shapes that took part in the measures.");
   cls.def_prop_ro(
       "errors",
       [](const Overlap& o) {
@@ -394,8 +396,8 @@ method asked for.)");
           return ErrorsOf{o.errors(), solid(o), o.pair() ? std::optional(o.contact_errors()) : std::nullopt};
         });
       },
-      R"(How far each figure may be off, as `volume_error` is that of the volume. It costs about as much as all figures
-together.)");
+      R"(Error bound of each quantity, as `volume_error` is that of the volume. They take about as long as all
+quantities together.)");
   define_measures(cls);
   define_boundary(cls);
   define_contact(cls);
@@ -408,10 +410,19 @@ together.)");
       "certificate",
       [](nb::handle self) { return nb::module_::import_("overlapper.proof.certificate").attr("certificate")(self); },
       nb::sig("def certificate(self) -> typing.Any"),
-      R"(What proves the status, and bounds of the volume, to somebody who does not trust us: an overlapper.proof.claims.Certificate.
+      R"(A certificate that proves the status and bounds of the volume.
 
-`verify()` of it checks everything in rational arithmetic without the core, and returns (lower, upper) bounds of the common
-volume in m³. Raises CertificateError where there is none.)");
+Its `verify()` checks everything in rational arithmetic, without the core.
+
+Returns
+-------
+overlapper.proof.claims.Certificate
+    `verify()` returns (lower, upper) bounds of the common volume in m³.
+
+Raises
+------
+overlapper.proof.claims.CertificateError
+    If there is no certificate.)");
   cls.def("__copy__", [](nb::handle self) { return nb::borrow(self); });
   cls.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
   cls.def(
@@ -471,19 +482,30 @@ void define_functions(nb::module_& m) {
                   .c_str()),
       R"(The common set of two or more convex shapes.
 
-    lens = overlap(Sphere(0.5), Placed(Sphere(0.5), position=(0.6, 0, 0)))
-    lens.volume, lens.volume_error, lens.depth, lens.normal
+>>> from overlapper import Placed, Sphere, overlap
+>>> lens = overlap(Sphere(0.5), Placed(Sphere(0.5), position=(0.6, 0, 0)))
+>>> round(lens.volume, 6), round(lens.depth, 6), lens.normal.tolist()
+(0.108909, 0.4, [-1.0, 0.0, 0.0])
 
-Each of `shapes` is a shape, a Placed, or an (n, 3) array of points, which stands for their convex hull. `tolerance`, between
-0 and 1, is the allowed relative error of the volume for curved shapes. `converged` is False if it was not reached.
-Polyhedra are exact and ignore it. No overlap is an answer, not an error. Raises ValueError if the common set is unbounded.
+Parameters
+----------
+*shapes : shape, Placed or (n, 3) array_like
+    Two or more bodies. A bare shape lies at the origin. Points in m stand for their convex hull.
+tolerance : float, default 0.001
+    Allowed relative error of the volume for curved shapes, between 0 and 1. Polyhedra are exact and ignore it.
+method : {'auto', 'paper'}, default 'auto'
+    'auto' tries the ways of `Overlaps.WAYS`. 'paper' follows the article of Tereshchenko, Chevokin and Fisunenko,
+    'Algorithm for finding the domain intersection of a set of polytopes' (ICCS 2013). docs/how.md has its steps.
 
-`method` 'auto' tries the ways of `Overlaps.WAYS` and always returns an answer. `method` 'paper' follows the article of
-Tereshchenko, Chevokin and Fisunenko, 'Algorithm for finding the domain intersection of a set of polytopes' (ICCS 2013). GJK
-finds a common point. A point on a boundary is shifted by 2^-26 of the smaller polytope in one of 26 directions. If no
-shifted point is inside both bodies, the status is 'touching'. The convex hull of the dual points of all face planes follows,
-then its dual. More than two bodies are intersected in pairs, by divide and conquer. Three things differ from the article:
-curved shapes are replaced by inscribed polytopes, half-spaces by large boxes, and hulls use exact predicates.)");
+Returns
+-------
+Overlap
+    SI units, world coordinates. No overlap is a result, not an error: `bool(result)` is False.
+
+Raises
+------
+ValueError
+    If there are fewer than two shapes, or if the common set is unbounded.)");
   m.def(
       "distance",
       [](nb::handle a, nb::handle b) {
@@ -498,7 +520,23 @@ curved shapes are replaced by inscribed polytopes, half-spaces by large boxes, a
       },
       "a"_a.none(), "b"_a.none(),
       nb::sig(("def distance(a: " + any_body() + ", b: " + any_body() + ") -> float").c_str()),
-      "Distance (m) between the nearest points of two shapes. 0 if they touch or overlap.");
+      R"(Distance between the nearest points of two shapes.
+
+Parameters
+----------
+a, b : shape, Placed or (n, 3) array_like
+    The two bodies.
+
+Returns
+-------
+float
+    Distance in m. 0 if the bodies touch or overlap.
+
+Examples
+--------
+>>> from overlapper import Box, Placed, distance
+>>> distance(Box([0.5, 0.5, 0.5]), Placed(Box([0.5, 0.5, 0.5]), (1.25, 0, 0)))
+0.25)");
   m.def(
       "penetration_depth",
       [](nb::handle a, nb::handle b) {
@@ -511,8 +549,28 @@ curved shapes are replaced by inscribed polytopes, half-spaces by large boxes, a
       },
       "a"_a.none(), "b"_a.none(),
       nb::sig(("def penetration_depth(a: " + any_body() + ", b: " + any_body() + ") -> float").c_str()),
-      R"(Length (m) of the shortest translation that separates two shapes. 0 if they do not overlap. Positive where pybullet's
-contact distance is negative. Raises ValueError for two half-spaces.)");
+      R"(Length of the shortest translation that separates two shapes.
+
+Parameters
+----------
+a, b : shape, Placed or (n, 3) array_like
+    The two bodies.
+
+Returns
+-------
+float
+    Depth in m. It is positive where pybullet's contact distance is negative. 0 if the bodies do not overlap.
+
+Raises
+------
+ValueError
+    If both bodies are half-spaces.
+
+Examples
+--------
+>>> from overlapper import Box, Placed, penetration_depth
+>>> penetration_depth(Box([0.5, 0.5, 0.5]), Placed(Box([0.5, 0.5, 0.5]), (0.75, 0, 0)))
+0.25)");
   m.def(
       "iou",
       [](nb::handle a, nb::handle b, nb::handle tolerance) {
@@ -520,7 +578,25 @@ contact distance is negative. Raises ValueError for two half-spaces.)");
       },
       "a"_a.none(), "b"_a.none(), "tolerance"_a.none() = 1e-3,
       nb::sig(("def iou(a: " + any_body() + ", b: " + any_body() + ", tolerance: float = 0.001) -> float").c_str()),
-      "Intersection over union of two shapes: the common volume divided by the volume of the union, from 0 to 1.");
+      R"(Intersection over union of two shapes: the common volume divided by the volume of the union.
+
+Parameters
+----------
+a, b : shape, Placed or (n, 3) array_like
+    The two bodies.
+tolerance : float, default 0.001
+    Allowed relative error of the common volume for curved shapes, between 0 and 1.
+
+Returns
+-------
+float
+    The ratio, from 0 to 1.
+
+Examples
+--------
+>>> from overlapper import Box, Placed, iou
+>>> round(iou(Box([0.5, 0.5, 0.5]), Placed(Box([0.5, 0.5, 0.5]), (0.5, 0, 0))), 12)
+0.333333333333)");
 }
 
 }  // namespace

@@ -126,10 +126,10 @@ void define_common(nb::class_<T>& cls) {
   cls.def_prop_ro("volume", [](const T& s) { return s.volume(); }, "Volume in m³; infinite for a half-space.");
   array_property(
       cls, "centroid", [](const T& s) { return to_numpy(s.centroid() + data_origin(s)); },
-      "(3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.");
+      "(3,) centre of volume in the shape's frame, m. For a half-space: the boundary point nearest to the origin.");
   array_property(
       cls, "bounds", [](const T& s) { return to_numpy(bounds(make_placed(s, {}, {}))); },
-      "(2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.");
+      "(2, 3) lower and upper corner of the bounding box in the shape's frame, m; infinite for a half-space.");
   cls.def("__repr__", [](const T& s) { return repr(s); });
   cls.def("__copy__", [](nb::handle self) { return nb::borrow(self); });
   cls.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
@@ -240,13 +240,14 @@ Hull hull_from_state(nb::handle given) {
 void define(nb::module_& m, const HalfSpace*) {
   nb::class_<HalfSpace> half = class_of<HalfSpace>(m);
   array_property(
-      half, "normal", [](const HalfSpace& h) { return to_numpy(h.plane.normal); }, "(3,) unit, out of the solid");
-  half.def_prop_ro("offset", [](const HalfSpace& h) { return h.plane.offset; }, "m along the unit normal");
+      half, "normal", [](const HalfSpace& h) { return to_numpy(h.plane.normal); },
+      "(3,) unit vector out of the solid.");
+  half.def_prop_ro("offset", [](const HalfSpace& h) { return h.plane.offset; }, "Offset along the unit normal, m.");
   array_property(
       half, "given_normal", [](const HalfSpace& h) { return to_numpy(h.given_normal); },
-      "(3,) as given, of any length");
+      "(3,) normal as given, of any length.");
   half.def_prop_ro(
-      "given_offset", [](const HalfSpace& h) { return h.given_offset; }, "As given, along the normal as given.");
+      "given_offset", [](const HalfSpace& h) { return h.given_offset; }, "Offset as given, for the normal as given.");
   define_common(half);
 }
 
@@ -261,7 +262,7 @@ void define(nb::module_& m, const Hull*) {
       "vertices"_a.none(), nb::sig("def __init__(self, vertices: numpy.typing.ArrayLike) -> None"));
   array_property(
       hull, "vertices", [](const Hull& h) { return to_numpy(h.data->vertices, h.data->origin); },
-      "(n, 3) the corners only, m; without those that mere rounding lifts off a facet");
+      "(n, 3) vertices of the hull, m, without those that only rounding errors lift off a facet.");
   hull.def_prop_ro(
       "facets", [](const Hull& h) { return polygons(h.data->ring, h.data->ring_start); },
       nb::sig("def facets(self) -> list[numpy.typing.NDArray[numpy.int32]]"),
@@ -276,11 +277,11 @@ void define(nb::module_& m, const Hull*) {
       "(k, 4) rows [n, b], one per facet: n · x + b <= 0 inside, n unit (scipy's form).");
   array_property(
       hull, "corners", [](const Hull& h) { return to_numpy(h.data->corners, h.data->origin); },
-      "(n, 3) all corners of the hull of the points as given, without rounding, m");
+      "(n, 3) all vertices of the exact hull of the given points, m.");
   array_property(
       hull, "triangles", [](const Hull& h) { return to_numpy(h.data->triangles); },
-      "(k, 3) indices of the corners of its surface before coplanar triangles are merged, counter-clockwise from "
-      "outside.");
+      "(k, 3) triangles of the surface before coplanar triangles are merged: indices into corners, counter-clockwise "
+      "from outside.");
   define_common(hull);
   hull.def("__getstate__", &hull_state, nb::sig("def __getstate__(self) -> tuple[object, ...]"));
   hull.def(
@@ -299,8 +300,8 @@ void define(nb::module_& m, const RoundedHull*) {
       },
       "vertices"_a.none(), "radius"_a.none(),
       nb::sig("def __init__(self, vertices: numpy.typing.ArrayLike, radius: float) -> None"));
-  rounded.def_prop_ro("core", [](const RoundedHull& h) { return h.core; }, "The hull that is rounded.");
-  rounded.def_ro("radius", &RoundedHull::radius, "m");
+  rounded.def_prop_ro("core", [](const RoundedHull& h) { return h.core; }, "The hull inside, before rounding.");
+  rounded.def_ro("radius", &RoundedHull::radius, "Radius of the rounding, m.");
   define_common(rounded);
   rounded.def(
       "__getstate__", [](const RoundedHull& h) { return nb::make_tuple(hull_state(h.core), h.radius); },
@@ -343,9 +344,21 @@ void define_placed(nb::module_& m) {
   nb::class_<Placed> placed(m, "Placed",
                             R"(A shape and where it is in the world.
 
-position is (3,) in m. orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0, or a
-scipy.spatial.transform.Rotation. The body is turned by M(q) / |q|² for the quaternion as given, without rounding. The
-attribute `orientation` is divided by the length, which rounds.)");
+Parameters
+----------
+shape : shape or (n, 3) array_like
+    A shape without a pose, or points in m, which stand for their convex hull.
+position : (3,) array_like, default (0, 0, 0)
+    Position of the shape's origin, m.
+orientation : (4,) array_like or scipy.spatial.transform.Rotation, default (0, 0, 0, 1)
+    Quaternion x, y, z, w as in pybullet, of any length but 0. The exact rotation is M(q) / |q|² for the quaternion as
+    given. The attribute `orientation` is divided by the length, which rounds.
+
+Examples
+--------
+>>> from overlapper import Placed, Sphere
+>>> Placed(Sphere(0.5), position=(0, 0, 1)).bounds.tolist()
+[[-0.5, -0.5, 0.5], [0.5, 0.5, 1.5]])");
   placed.def(
       "__init__",
       [](Placed* self, nb::handle shape, nb::handle position, nb::handle orientation) {
@@ -368,25 +381,43 @@ attribute `orientation` is divided by the length, which rounds.)");
       nb::sig(("def from_matrix(shape: " + any_shape() +
                " | numpy.typing.ArrayLike, matrix: numpy.typing.ArrayLike) -> Placed")
                   .c_str()),
-      R"(A shape placed by a homogeneous matrix (4, 4), as of trimesh: a rotation, and a position in m.
+      R"(A shape placed by a homogeneous matrix, as used by trimesh.
 
-ValueError if the matrix scales, shears or mirrors by more than 1e-6, or if its last row is not (0, 0, 0, 1).)");
+Parameters
+----------
+shape : shape or (n, 3) array_like
+    A shape without a pose, or points in m, which stand for their convex hull.
+matrix : (4, 4) array_like
+    A rotation, and a position in m.
+
+Returns
+-------
+Placed
+    The placed shape.
+
+Raises
+------
+ValueError
+    If the matrix scales, shears or mirrors by more than 1e-6, or if its last row is not (0, 0, 0, 1).)");
   placed.def_prop_ro(
       "shape", [](const Placed& p) { return to_python(p.shape); },
       nb::sig(("def shape(self) -> " + any_shape()).c_str()));
-  array_property(placed, "position", [](const Placed& p) { return to_numpy(p.position); }, "(3,) m");
+  array_property(
+      placed, "position", [](const Placed& p) { return to_numpy(p.position); }, "(3,) position in the world, m.");
   array_property(
       placed, "orientation", [](const Placed& p) { return to_numpy(unit(p.orientation)); },
-      "(4,) unit quaternion x, y, z, w");
+      "(4,) unit quaternion x, y, z, w.");
   array_property(
       placed, "given_orientation", [](const Placed& p) { return to_numpy(p.orientation); },
-      "(4,) x, y, z, w as given, of any length");
-  placed.def_prop_ro("volume", [](const Placed& p) { return volume(p.shape); }, "m³; infinite for a half-space");
+      "(4,) quaternion x, y, z, w as given, of any length.");
+  placed.def_prop_ro(
+      "volume", [](const Placed& p) { return volume(p.shape); }, "Volume in m³; infinite for a half-space.");
   array_property(
-      placed, "centroid", [](const Placed& p) { return to_numpy(p.pose * centroid(p.shape)); }, "(3,) in the world, m");
+      placed, "centroid", [](const Placed& p) { return to_numpy(p.pose * centroid(p.shape)); },
+      "(3,) centre of volume in the world, m.");
   array_property(
       placed, "bounds", [](const Placed& p) { return to_numpy(bounds(p)); },
-      "(2, 3) lower and upper corner of the box around it in the world, m");
+      "(2, 3) lower and upper corner of the bounding box in the world, m.");
   placed.def("__repr__", [](const Placed& p) { return repr(p); });
   placed.def(
       "__reduce__",

@@ -22,8 +22,21 @@ struct Box : Bounded,
              WidePlanesAcrossAxes,
              OrderedByFields<Box> {
   static constexpr const char* kName = "Box";
-  static constexpr const char* kAbout = "A box about the origin with half extents (m) along x, y, z.";
-  static constexpr auto fields() { return std::tuple{Field{"half_extents", &Box::half_extents, "(3,) m"}}; }
+  static constexpr const char* kAbout = R"(A box about the origin.
+
+Parameters
+----------
+half_extents : (3,) array_like
+    Half of the side lengths along x, y, z, m.
+
+Examples
+--------
+>>> from overlapper import Box
+>>> Box([0.5, 0.5, 1.0]).volume
+2.0)";
+  static constexpr auto fields() {
+    return std::tuple{Field{"half_extents", &Box::half_extents, "(3,) half of the side lengths, m."}};
+  }
 
   Box() = default;
   explicit Box(Vec3 h) : half_extents(h) {}

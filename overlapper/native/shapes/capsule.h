@@ -21,12 +21,23 @@ struct Capsule : Bounded,
                  OrderedByFields<Capsule> {
   static constexpr const char* kName = "Capsule";
   static constexpr const char* kAbout =
-      R"(All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.
+      R"(All points within a distance of a segment on the z axis: a cylinder with half balls as ends.
 
-As in pybullet, `length` lies between the centres of the caps; it may be 0.)";
+Parameters
+----------
+radius : float
+    Radius, m.
+length : float
+    Length between the centres of the half balls as in pybullet, m. It may be 0.
+
+Examples
+--------
+>>> from overlapper import Capsule
+>>> Capsule(0.1, 0.4).bounds.round(6).tolist()
+[[-0.1, -0.1, -0.3], [0.1, 0.1, 0.3]])";
   static constexpr auto fields() {
-    return std::tuple{Field{"radius", &Capsule::radius, "m"},
-                      Field{"length", &Capsule::length, "m, between the centres of the caps"}};
+    return std::tuple{Field{"radius", &Capsule::radius, "Radius, m."},
+                      Field{"length", &Capsule::length, "Length between the centres of the half balls, m."}};
   }
 
   Capsule() = default;

@@ -21,9 +21,23 @@ struct Cylinder : Bounded,
                   WidePlanesAcrossAxes,
                   OrderedByFields<Cylinder> {
   static constexpr const char* kName = "Cylinder";
-  static constexpr const char* kAbout = "A cylinder of `radius` (m) and `length` (m) along local z, about the origin.";
+  static constexpr const char* kAbout = R"(A cylinder about the origin, along the z axis.
+
+Parameters
+----------
+radius : float
+    Radius, m.
+length : float
+    Length along z, m.
+
+Examples
+--------
+>>> from overlapper import Cylinder
+>>> round(Cylinder(0.1, 0.4).volume, 6)
+0.012566)";
   static constexpr auto fields() {
-    return std::tuple{Field{"radius", &Cylinder::radius, "m"}, Field{"length", &Cylinder::length, "m"}};
+    return std::tuple{Field{"radius", &Cylinder::radius, "Radius, m."},
+                      Field{"length", &Cylinder::length, "Length along z, m."}};
   }
 
   Cylinder() = default;

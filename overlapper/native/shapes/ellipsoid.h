@@ -18,12 +18,24 @@ struct Ellipsoid : Bounded,
                    WidePlanesAcrossAxes,
                    OrderedByFields<Ellipsoid> {
   static constexpr const char* kName = "Ellipsoid";
-  static constexpr const char* kAbout = R"(An ellipsoid about the origin with half axes (m) along x, y, z.
+  static constexpr const char* kAbout =
+      R"(An ellipsoid about the origin: all points with (x / a)² + (y / b)² + (z / c)² <= 1.
 
-All points with (x / a)² + (y / b)² + (z / c)² <= 1. With equal half axes it answers as the sphere does. With a box, a
-hull or a half-space, it is measured as a ball is, of which it is the image; with other round bodies, between polytopes,
-as closely as `tolerance` asks.)";
-  static constexpr auto fields() { return std::tuple{Field{"half_axes", &Ellipsoid::half_axes, "(3,) m"}}; }
+An ellipsoid with equal half axes gives the results of the sphere. With a box, a hull or a half-space, an ellipsoid is
+measured as the affine image of a ball. With other round bodies, it is measured between polytopes, as closely as
+`tolerance` demands.
+
+Parameters
+----------
+half_axes : (3,) array_like
+    Half axes a, b, c along x, y, z, m.
+
+Examples
+--------
+>>> from overlapper import Ellipsoid
+>>> round(Ellipsoid([0.1, 0.1, 0.2]).volume, 6)
+0.008378)";
+  static constexpr auto fields() { return std::tuple{Field{"half_axes", &Ellipsoid::half_axes, "(3,) half axes, m."}}; }
 
   Ellipsoid() = default;
   explicit Ellipsoid(Vec3 h) : half_axes(h) {}

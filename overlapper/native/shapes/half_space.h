@@ -20,10 +20,23 @@ struct HalfSpace : Flat,
                    OrderedByFields<HalfSpace> {
   static constexpr bool kBounded = false;
   static constexpr const char* kName = "HalfSpace";
-  static constexpr const char* kAbout = R"(The closed half-space { x : normal · x <= offset }.
+  static constexpr const char* kAbout = R"(The closed half-space of all points x with normal · x <= offset.
 
-`normal` may have any length but 0. The half-space is what the two say as given, without rounding; the attributes
-`normal` and `offset` are both divided by the length, which rounds.)";
+The half-space is exactly that of the given numbers. The attributes `normal` and `offset` are divided by the length of
+the normal, which rounds.
+
+Parameters
+----------
+normal : (3,) array_like
+    Normal out of the solid, of any length but 0.
+offset : float
+    Offset along the normal as given, m if the normal has length 1.
+
+Examples
+--------
+>>> from overlapper import HalfSpace, Placed, Sphere, distance
+>>> distance(Placed(Sphere(0.1), (0, 0, 1)), HalfSpace([0, 0, 1], 0))
+0.9)";
   static constexpr auto fields() {
     return std::tuple{Field{"normal", &HalfSpace::given_normal, "(3,) as given, of any length"},
                       Field{"offset", &HalfSpace::given_offset, "As given, along the normal as given."}};

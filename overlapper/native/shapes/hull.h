@@ -19,10 +19,25 @@ struct Hull : Bounded,
               BoundedBySupports<Hull>,
               EnclosedByBounds<Hull> {
   static constexpr const char* kName = "Hull";
-  static constexpr const char* kAbout = R"(The convex hull of (n, 3) points (m).
+  static constexpr const char* kAbout = R"(The convex hull of points.
 
-Interior, duplicate and coplanar points are welcome; coplanar triangles become one facet. Raises
-ValueError for fewer than four points, for points that are not finite and for points in one plane.)";
+Points may lie inside the hull, occur twice or be coplanar. Coplanar triangles become one facet.
+
+Parameters
+----------
+vertices : (n, 3) array_like
+    Four points or more, m.
+
+Raises
+------
+ValueError
+    If there are fewer than four points, a point is not finite, or all points lie in one plane.
+
+Examples
+--------
+>>> from overlapper import Hull
+>>> round(Hull([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]).volume, 6)
+0.166667)";
 
   Hull() = default;
   explicit Hull(std::shared_ptr<const HullData> hull) : data(std::move(hull)) {}

@@ -16,11 +16,29 @@ struct RoundedHull : Bounded,
                      EnclosedByBounds<RoundedHull>,
                      ReachesToCornerOfBounds<RoundedHull> {
   static constexpr const char* kName = "RoundedHull";
-  static constexpr const char* kAbout = R"(All points within `radius` (m) of the convex hull of (n, 3) points (m).
+  static constexpr const char* kAbout = R"(All points within a distance of the convex hull of points.
 
-The Minkowski sum of the hull and a ball: what Bullet collides with where a convex mesh has a margin. ValueError as
-for Hull and Sphere. Method "paper" does not take it; more than two bodies that overlap, it among them, have
-no certificate, and neither does it with an ellipsoid that it overlaps.)";
+It is the Minkowski sum of the hull and a ball. Bullet collides with such shapes where a convex mesh has a margin. The
+method 'paper' does not accept it. It has no certificate with an ellipsoid that it overlaps, nor among three or more
+bodies that overlap.
+
+Parameters
+----------
+vertices : (n, 3) array_like
+    Four points or more, m.
+radius : float
+    Radius of the ball, m.
+
+Raises
+------
+ValueError
+    If `Hull` refuses the points, or `Sphere` refuses the radius.
+
+Examples
+--------
+>>> from overlapper import RoundedHull
+>>> RoundedHull([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], 0.5).bounds.tolist()
+[[-0.5, -0.5, -0.5], [1.5, 1.5, 1.5]])";
 
   RoundedHull() = default;
   RoundedHull(Hull hull, double r) : core(std::move(hull)), radius(r) {}

@@ -19,8 +19,19 @@ struct Sphere : Bounded,
                 WidePlanesAcrossAxes,
                 OrderedByFields<Sphere> {
   static constexpr const char* kName = "Sphere";
-  static constexpr const char* kAbout = "A ball of the given radius (m) about the origin.";
-  static constexpr auto fields() { return std::tuple{Field{"radius", &Sphere::radius, "m"}}; }
+  static constexpr const char* kAbout = R"(A ball about the origin.
+
+Parameters
+----------
+radius : float
+    Radius, m.
+
+Examples
+--------
+>>> from overlapper import Sphere
+>>> round(Sphere(0.5).volume, 6)
+0.523599)";
+  static constexpr auto fields() { return std::tuple{Field{"radius", &Sphere::radius, "Radius, m."}}; }
 
   Sphere() = default;
   explicit Sphere(double r) : radius(r) {}

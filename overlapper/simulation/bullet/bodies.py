@@ -25,34 +25,57 @@ class Bodies(AnyBodies):
             for contact in bodies.overlaps():
                 ...
 
+    Parameters
+    ----------
+    physicsClientId : int, default 0
+        What pybullet.connect() returned.
+    concave : {'decompose', 'enclose', 'skip'}, default 'decompose'
+        'decompose': make convex parts of concave meshes with CoACD, and skip open meshes, which bound no volume.
+        'enclose': also close open meshes by walls. 'skip': skip all concave meshes.
+    concave_threshold : float, default 0.05
+        Allowed concavity of the parts, from 0.01 (many parts) to 1 (the convex hull).
+    surface : {'nominal', 'margin'}, default 'nominal'
+        'margin': convex meshes have the collision margin of Bullet, 1 mm by default.
+    recorder : Recorder, optional
+        A recorder that was set up before the scene was built. It knows pair filters, the filter mode, self-collision,
+        height fields and files, which pybullet cannot be asked for.
+    names : dict of int to str, optional
+        Names of bodies by their numbers. An UnknownBodyWarning names numbers that are not in the simulation.
+
+    Raises
+    ------
+    TypeError
+        If `physicsClientId` is not an integer.
+    ValueError
+        If the client is not connected, the recorder is of another client, or a name is invalid.
+    RuntimeError
+        If the physics server writes where this process cannot read.
+
+    Notes
+    -----
     Boxes, spheres, capsules, cylinders, planes and convex meshes are modelled. Compounds are modelled part by part.
     Soft bodies, flat hulls and height fields without a recorder are not modelled. They are in `skipped`, and each gives
     one SkippedShapeWarning. The same holds for mesh files that pybullet could not read, but only if a recorder has
     noted the model that names them.
 
-    Concave meshes are decomposed into convex parts. Each part is a shape of the link, and `decomposed` lists the
-    meshes. `concave_threshold`, from 0.01 to 1, is the concavity that may be left (see
-    overlapper.polytopes.decomposition). The first decomposition of a mesh may take minutes and needs the extra
-    `concave`. A mesh with an open surface bounds no volume and is skipped. With concave="enclose" CoACD closes such
-    meshes by walls. With concave="skip" all concave meshes are skipped.
+    Each convex part of a concave mesh is a shape of the link. `decomposed` lists the meshes. The first decomposition of
+    a mesh may take minutes and needs the extra `concave` (see overlapper.polytopes.decomposition).
 
-    With surface="margin" convex meshes have the margin that Bullet lays around them, 1 mm by default. Depths then agree
-    with pybullet's contact distances. Boxes and cylinders are the same either way, as their margin lies inside. In most
-    pairs Bullet rounds their edges by the margin, which takes up to 0.73 mm off a corner. Convex parts of concave
-    meshes have no margin. `update()` notices a changed margin if `getDynamicsInfo` of the base reports it.
+    With surface="margin", depths agree with pybullet's contact distances. Boxes and cylinders are the same either way,
+    as their margin lies inside. In most pairs Bullet rounds their edges by the margin, which takes up to 0.73 mm off a
+    corner. Convex parts of concave meshes have no margin. `update()` notices a changed margin if `getDynamicsInfo` of
+    the base reports it.
 
-    Pairs are those that pybullet lets collide, by static bases, groups and masks. pybullet cannot be asked for pair
-    filters, the filter mode and self-collision. A `recorder` that is set up before the scene is built knows them.
-    `pairs` and `overlaps` take other choices. Groups and masks are read again when there are new bodies, when a base
-    becomes static or stops being static, and when a recorder hears of a change.
+    Pairs are those that pybullet lets collide, by static bases, groups and masks. `pairs` and `overlaps` take other
+    choices. Groups and masks are read again when there are new bodies, when a base becomes static or stops being
+    static, and when a recorder hears of a change.
 
     Height fields that a recorder has noted are modelled as the prisms below their triangles. Only the prisms near other
     shapes are modelled, and they are released when the shapes move away. `report()` counts all triangles as shapes, and
     the modelled ones as read.
 
-    `names` are names of bodies by their numbers. An UnknownBodyWarning names the numbers that are not there yet. Other
-    bodies are called by the stem of their file, which a recorder hears, by the name of their robot, or by their mesh or
-    kind of shape. The most informative name is taken.
+    Bodies without a name in `names` are called by the stem of their file, which a recorder hears, by the name of their
+    robot, or by their mesh or kind of shape. The most informative name is taken.
 
     If a body collides with itself and no recorder has heard of it, pybullet's contact points show it. overlaps() then
     gives one SelfCollisionWarning.
@@ -64,10 +87,6 @@ class Bodies(AnyBodies):
     bodies are read from a temporary .bullet file. If two bodies stand at the same point, the friction of all bodies is
     set and restored to tell them apart. Bodies that another process adds to a shared simulation are noticed after
     `pybullet.syncBodyInfo()`. pybullet gives no ids to bodies that loadBullet brings; `skipped` counts them.
-
-    TypeError if `physicsClientId` is not an integer. ValueError if it is not connected, the recorder is of another
-    client, or a name is invalid.
-    RuntimeError if the physics server writes where this process cannot read.
     """
 
     def __init__(

@@ -57,6 +57,11 @@ class Recorder:
     Until `close()`, or the end of a `with`, these functions are replaced in the module `pybullet`, for all clients. The
     replacements call the original functions and note the calls for this client. Calls of another process to a shared
     simulation are not noticed.
+
+    Parameters
+    ----------
+    physicsClientId : int, default 0
+        What pybullet.connect() returned.
     """
 
     def __init__(self, physicsClientId: int = 0) -> None:
@@ -86,7 +91,18 @@ class Recorder:
         self._shapes: dict[int, int] = {}  # by body that is a height field
 
     def height_field(self, body: int) -> HeightField | None:
-        """The height field of a body, if it was given as heightfieldData."""
+        """The height field of a body, if it was given as heightfieldData.
+
+        Parameters
+        ----------
+        body : int
+            The number of the body.
+
+        Returns
+        -------
+        HeightField or None
+            The noted height field.
+        """
         return self._fields.get(self._shapes.get(body, -1))
 
     def close(self) -> None:

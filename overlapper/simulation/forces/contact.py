@@ -34,30 +34,55 @@ class VolumetricContact:
             while ...:
                 contact.step()  # instead of pybullet.stepSimulation()
 
-    Bodies are elastic foundations (Winkler): the pressure is `stiffness` (Pa/m) times the depth. The force between a
-    pair is stiffness times the common volume. It goes through the centroid of this volume, along the area vector of the
-    contact patch. A layer of thickness t and modulus E has the stiffness E / t. Two bodies in series have 1 / (1 / k1 +
-    1 / k2). A body rests at the depth where stiffness times volume is its weight. The force on a body of several convex
+    Parameters
+    ----------
+    bodies : Bodies
+        The bodies of a simulation.
+    pairs : {'simulated', 'all'} or list of pairs, optional
+        Pairs as in `Bodies.pairs`. Default: all pairs that the simulator lets collide.
+    stiffness : float or callable, default 1e7
+        Pressure for each metre of depth, Pa/m. A layer of thickness t and modulus E has the stiffness E / t. Two bodies
+        in series have 1 / (1 / k1 + 1 / k2).
+    dissipation : float or callable, default 0.001
+        Time in s by which pressures are ahead of the depth (Kelvin and Voigt). The damping ratio of an oscillation of
+        angular frequency w is w * dissipation / 2. A dissipation of 0 keeps the energy.
+    friction : float, callable or 'distributed', optional
+        Coulomb's coefficient. Default: that of pybullet, the product of the two links' lateralFriction. With
+        "distributed", friction acts at points spread over the patch, with pybullet's coefficients. This is more exact
+        where bodies slip and spin at once.
+    substeps : int or 'auto', default 'auto'
+        Number of parts of a step of the simulator. 'auto': it follows from the stiffness and the masses, anew in every
+        step.
+
+    Raises
+    ------
+    TypeError
+        If `bodies` is not the Bodies of a simulation.
+    ValueError
+        If another argument is invalid. The message names it.
+    RuntimeError
+        At the `with`, if its client has an active VolumetricContact already.
+
+    Notes
+    -----
+    Bodies are elastic foundations (Winkler): the pressure is `stiffness` times the depth. The force between a pair is
+    stiffness times the common volume. It goes through the centroid of this volume, along the area vector of the contact
+    patch. A body rests at the depth where stiffness times volume is its weight. The force on a body of several convex
     parts is the sum of the forces on its parts, as if the parts were one body. Where the parts overlap each other, the
     force counts twice.
 
-    `dissipation` (s) is the time by which pressures are ahead of the depth (Kelvin and Voigt). The damping ratio of an
-    oscillation of angular frequency w is w * dissipation / 2. A dissipation of 0 keeps the energy. `friction` is
-    Coulomb's coefficient. By default it is that of pybullet: the product of the two links' lateralFriction. A patch
-    resists slip and spin together: its force and torque stay within an ellipsoid. Sticking bodies do not creep. With
-    "distributed", friction acts at points spread over the patch, with pybullet's coefficients. This is more exact where
-    bodies slip and spin at once. Restitution, rolling and spinning friction of pybullet are not used. Each of the three
-    may be a function of the pair of links, as stiffness=lambda a, b: .... Its arguments are two (body, link). It is
-    called once for each pair.
+    `stiffness`, `dissipation` and `friction` may be functions of the pair of links, as in stiffness=lambda a, b: ....
+    The arguments are two (body, link). The function is called once for each pair.
 
-    A step of the simulator is divided into `substeps`. By default their number follows from the stiffness and the
-    masses, anew in every step. If there are too few substeps, one SubstepsWarning for each pair says so. The contacts
-    of such pairs are then solved by backward Euler, which loses energy.
+    A patch resists slip and spin together: its force and torque stay within an ellipsoid. Sticking bodies do not creep.
+    Restitution, rolling and spinning friction of pybullet are not used.
 
-    `pairs` are those that `Bodies.pairs` takes, by default all pairs that the simulator lets collide. Within the
-    `with`, Bullet does not respond to these pairs, whether they touch or not, and getContactPoints has none of them.
-    Bullet simulates everything else: joints, motors, constraints and other pairs. A `Bodies` with a recorder knows
-    which pairs a script has filtered. Without a recorder, filtered pairs are pushed apart, too.
+    If there are too few substeps, each pair gives one SubstepsWarning. The contacts of such pairs are then solved by
+    backward Euler, which loses energy.
+
+    Within the `with`, Bullet does not respond to these pairs, whether they touch or not, and getContactPoints has none
+    of them. Bullet simulates everything else: joints, motors, constraints and other pairs. A `Bodies` with a recorder
+    knows which pairs a script has filtered. Without a recorder, filtered pairs are pushed apart, too.
 
     All other forces on the bodies (gravity, motors, constraints, forces of the script) are assumed to be as in the
     substep before. Within the `with`, the script's commands to motors and constraints and the forces that it applies
@@ -65,17 +90,14 @@ class VolumetricContact:
     motors are those of a whole step, too. A motor that was commanded before the `with` is stronger by the number of
     substeps, unless a recorder knows the command.
 
-    A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning. The other bodies go on.
+    A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning. The other bodies continue.
 
     If a body lies wholly within another, or goes through a plate, its force has no direction. The body is pushed in its
-    last direction, or along the shortest translation that separates it. One NoDirectionWarning for each pair says so.
+    last direction, or along the shortest translation that separates it. Each such pair gives one NoDirectionWarning.
 
     After `step()` or `forces()` there is a row for each pair of shapes that overlaps in the last substep. Values are in
     SI units and in world coordinates. The rows of `force`, `torque`, `centre`, `energy` and `slip` are parallel to
     `contacts`. `last` has them all. `mean()` has the mean over the whole step.
-
-    ValueError says which argument is wrong. RuntimeError is raised at the `with` if its client is within another one
-    already.
     """
 
     def __init__(
@@ -124,7 +146,10 @@ class VolumetricContact:
     def step(self) -> None:
         """Advance the simulation by one of its time steps.
 
-        RuntimeError outside of the `with`, because Bullet would push the bodies apart as well.
+        Raises
+        ------
+        RuntimeError
+            Outside of the `with`, because Bullet would push the bodies apart as well.
         """
         if not self._inside:
             raise RuntimeError("step() is for within `with contact:`, where Bullet does not respond to these pairs")
@@ -158,9 +183,14 @@ class VolumetricContact:
         self._mechanics.announce()
 
     def forces(self) -> Forces:
-        """Return the forces at the beginning of a step, without taking the step.
+        """The forces at the beginning of a step, without taking the step.
 
         It is meant for scripts that integrate by themselves.
+
+        Returns
+        -------
+        Forces
+            A row for each pair of shapes that overlaps.
         """
         self._refresh()
         velocity, lost = self._velocity()
@@ -171,11 +201,16 @@ class VolumetricContact:
         return self._found
 
     def mean(self) -> Forces:
-        """Return the overlaps now, with the mean of force and torque over the last step.
+        """The overlaps now, with the mean of force and torque over the last step.
 
         The mean is what moved the bodies in the step. Forces of single substeps oscillate about the mean, as motors do.
-        `slip` is that at the end of the step. A pair that separated within the step has no row. A pair that began to
-        overlap at the very end of the step has no force yet.
+        A pair that separated within the step has no row. A pair that began to overlap at the very end of the step has
+        no force yet.
+
+        Returns
+        -------
+        Forces
+            `slip` is that at the end of the step.
         """
         self._follow()
         contacts = self.bodies.overlaps(pairs=self._among)
@@ -228,9 +263,28 @@ class VolumetricContact:
         return self._found.slip
 
     def on(self, body: int, link: int | None = None) -> tuple[Array, Array]:
-        """Return the force (3,) in N and the torque (3,) in N m on a body or on a link of it, from all pairs.
+        """Force and torque on a body or on a link of it, from all pairs.
 
-        The torque is about the world's origin. ValueError if there is no such body or link.
+        Forces between links of one body cancel, unless one link is given.
+
+        Parameters
+        ----------
+        body : int
+            The number of the body.
+        link : int, optional
+            The number of the link, -1 for the base. Default: the whole body.
+
+        Returns
+        -------
+        force : (3,) ndarray
+            The force in N, in world coordinates.
+        torque : (3,) ndarray
+            The torque about the world's origin in N m.
+
+        Raises
+        ------
+        ValueError
+            If there is no such body or link.
         """
         return self._found.on(body, link)
 

@@ -23,18 +23,26 @@ NO_PATCH = 1e-6
 class Forces(Tabular):
     """Forces between overlapping pairs of shapes, a row for each pair, in SI units and world coordinates.
 
-    - `contacts`: the overlaps of the pairs.
-    - `force` (p, 3) in N: acts on the first of each pair at `centre`. The opposite force acts on the second.
-    - `torque` (p, 3) in N m: acts on the first about `centre`. The opposite torque acts on the second. It comes from
-      pressures that change and from friction that resists spinning.
-    - `slip` (p, 3) in m/s: the velocity of the first over the second at `centre`, along the patch, at the end of the
-      step.
-    - `normal` (p, 3): the direction of the pressures, a unit vector from the second to the first.
-    - `directed` (p,): False where the overlap has no direction. `normal` is then the last known one.
-    - `stiffness` (p,): in Pa/m.
+    As a table, by `to_pandas()`, `to_arrow()` and `to_polars()`, they have the columns of `contacts` and the columns
+    that volumetric contact adds to `overlapper run`.
 
-    As a table, by `to_pandas()` and its like, they have the columns of `contacts` and the columns that volumetric
-    contact adds to `overlapper run`.
+    Parameters
+    ----------
+    contacts : Contacts
+        The overlaps of the pairs.
+    force : (p, 3) ndarray
+        In N. It acts on the first of each pair at `centre`. The opposite force acts on the second.
+    torque : (p, 3) ndarray
+        In N m. It acts on the first about `centre`. The opposite torque acts on the second. It comes from pressures
+        that change and from friction that resists spinning.
+    slip : (p, 3) ndarray
+        In m/s. The velocity of the first over the second at `centre`, along the patch, at the end of the step.
+    normal : (p, 3) ndarray
+        The direction of the pressures: a unit vector from the second to the first.
+    directed : (p,) ndarray of bool
+        False where the overlap has no direction. `normal` is then the last known one.
+    stiffness : (p,) ndarray
+        In Pa/m.
     """
 
     contacts: Contacts
@@ -70,10 +78,28 @@ class Forces(Tabular):
         return energies(self.contacts.overlaps, self.normal, self.stiffness)
 
     def on(self, body: int, link: int | None = None) -> tuple[Array, Array]:
-        """Return the force (3,) in N and the torque (3,) in N m on a body or on a link of it, from all pairs.
+        """Force and torque on a body or on a link of it, from all pairs.
 
-        The torque is about the world's origin. Forces between links of one body cancel, unless one link is asked for.
-        ValueError if there is no such body or link.
+        Forces between links of one body cancel, unless one link is given.
+
+        Parameters
+        ----------
+        body : int
+            The number of the body.
+        link : int, optional
+            The number of the link, -1 for the base. Default: the whole body.
+
+        Returns
+        -------
+        force : (3,) ndarray
+            The force in N, in world coordinates.
+        torque : (3,) ndarray
+            The torque about the world's origin in N m.
+
+        Raises
+        ------
+        ValueError
+            If there is no such body or link.
         """
         known = self.contacts.names
         if not any(id == body for id, _ in known):
@@ -91,7 +117,13 @@ class Forces(Tabular):
         return force, moment
 
     def between_links(self) -> dict[tuple[int, int, int, int], Array]:
-        """Return the force (3,) in N on the first of two links, by (bodyA, linkA, bodyB, linkB)."""
+        """Forces between links.
+
+        Returns
+        -------
+        dict
+            By (bodyA, linkA, bodyB, linkB): the force (3,) in N on the first link.
+        """
         found: dict[tuple[int, int, int, int], Array] = {}
         for (a, la, _, b, lb, _), force in zip(self.pairs.tolist(), self.force):
             found[a, la, b, lb] = found.get((a, la, b, lb), 0.0) + force
@@ -103,7 +135,13 @@ class Forces(Tabular):
         return np.column_stack([getattr(self, name) for name in FORCE_MEASURES])
 
     def columns(self) -> Columns:
-        """Return the columns of the table by name, each an array or a list with a value for each row."""
+        """The columns of the table by name.
+
+        Returns
+        -------
+        dict of str to ndarray or list
+            A value for each row.
+        """
         return {**self.contacts.columns(), **dict(zip(FORCE_COLUMNS, self.measures.T))}
 
     def __len__(self) -> int:

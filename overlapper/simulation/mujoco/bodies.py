@@ -24,6 +24,30 @@ class Bodies(AnyBodies):
             for contact in bodies.overlaps():
                 ...
 
+    Parameters
+    ----------
+    model : mujoco.MjModel
+        The model.
+    data : mujoco.MjData
+        The data of this model. It must have poses: after mj_forward, mj_step or mj_kinematics.
+    names : dict of int to str, optional
+        Names of bodies by MuJoCo's numbers. They replace those of the model.
+    surface : {'nominal'}
+        Accepted as in pybullet's Bodies, so that the same loop works with both.
+    concave : {'decompose', 'enclose', 'skip'}
+        Accepted as in pybullet's Bodies. It has no effect, as MuJoCo collides convex hulls.
+    concave_threshold : float
+        Accepted as in pybullet's Bodies. It has no effect.
+
+    Raises
+    ------
+    TypeError
+        If `model` or `data` is of another class.
+    ValueError
+        If `data` is of another model or has no poses yet, or if a name or the surface is invalid.
+
+    Notes
+    -----
     Planes, spheres, capsules, ellipsoids, cylinders, boxes and meshes are modelled. A plane is infinite, as in MuJoCo's
     collisions. A mesh is the convex hull that MuJoCo collides. Height fields, SDF plugins and flexes are in `skipped`,
     with one SkippedShapeWarning each. Surfaces are nominal. MuJoCo's `contact.dist` is a distance of nominal surfaces,
@@ -36,14 +60,6 @@ class Bodies(AnyBodies):
 
     Pairs are those that mj_collision looks at, by masks, welds, parents, excludes, explicit pairs and flags at the last
     update. `pairs` and `overlaps` take other choices.
-
-    `data` must belong to this `model` and have poses: after mj_forward, mj_step or mj_kinematics. `names` are names of
-    bodies by MuJoCo's numbers, and replace those of the model. `surface`, `concave` and `concave_threshold` are
-    accepted as in pybullet's Bodies, so that the same loop works with both. `surface` must be "nominal". The other two
-    have no effect, as MuJoCo collides hulls.
-
-    TypeError if `model` or `data` is of another class. ValueError if `data` is of another model or has no poses yet, or
-    if a name or the surface is invalid.
     """
 
     def __init__(

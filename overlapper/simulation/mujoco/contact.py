@@ -10,12 +10,19 @@ from overlapper.simulation.model import BASE
 
 @dataclass(frozen=True, slots=True)
 class GeomContact(Contact):
-    """Two geoms that overlap or touch; `overlap.status` says which.
+    """Two geoms that overlap or touch; `overlap.status` tells which.
 
-    Bodies (`bodyA`, `bodyB`) and geoms (`geomA`, `geomB`) have MuJoCo's numbers. In tables, a geom has the column of a
-    link: `linkA` and `linkB` are the geoms, `shapeA` and `shapeB` are 0. A is the lesser of the two by (body, geom).
-    `overlap.normal` points from B to A. MuJoCo's `contact.frame[:3]` points from `contact.geom[0]` to
-    `contact.geom[1]`.
+    Bodies and geoms have MuJoCo's numbers. A is the lesser of the two by (body, geom). `overlap.normal` points from B
+    to A. MuJoCo's `contact.frame[:3]` points from `contact.geom[0]` to `contact.geom[1]`.
+
+    Parameters
+    ----------
+    bodyA, linkA, shapeA : int
+        Number of the first body and of its geom, and 0. In tables, a geom has the column of a link. `geomA` is `linkA`.
+    bodyB, linkB, shapeB : int
+        Those of the second geom.
+    overlap : Overlap
+        The overlap of the two.
     """
 
     @property

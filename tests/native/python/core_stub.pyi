@@ -9,7 +9,20 @@ from numpy.typing import NDArray
 
 
 class Sphere:
-    """A ball of the given radius (m) about the origin."""
+    """
+    A ball about the origin.
+
+    Parameters
+    ----------
+    radius : float
+        Radius, m.
+
+    Examples
+    --------
+    >>> from overlapper import Sphere
+    >>> round(Sphere(0.5).volume, 6)
+    0.523599
+    """
 
     def __init__(self, radius: float) -> None: ...
 
@@ -17,7 +30,7 @@ class Sphere:
 
     @property
     def radius(self) -> float:
-        """m"""
+        """Radius, m."""
 
     @property
     def volume(self) -> float:
@@ -26,13 +39,13 @@ class Sphere:
     @property
     def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
         """
-        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        (3,) centre of volume in the shape's frame, m. For a half-space: the boundary point nearest to the origin.
         """
 
     @property
     def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
-        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        (2, 3) lower and upper corner of the bounding box in the shape's frame, m; infinite for a half-space.
         """
 
     def __repr__(self) -> str: ...
@@ -42,7 +55,20 @@ class Sphere:
     def __deepcopy__(self, memo: object) -> object: ...
 
 class Box:
-    """A box about the origin with half extents (m) along x, y, z."""
+    """
+    A box about the origin.
+
+    Parameters
+    ----------
+    half_extents : (3,) array_like
+        Half of the side lengths along x, y, z, m.
+
+    Examples
+    --------
+    >>> from overlapper import Box
+    >>> Box([0.5, 0.5, 1.0]).volume
+    2.0
+    """
 
     def __init__(self, half_extents: numpy.typing.ArrayLike) -> None: ...
 
@@ -50,7 +76,7 @@ class Box:
 
     @property
     def half_extents(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(3,) m"""
+        """(3,) half of the side lengths, m."""
 
     @property
     def volume(self) -> float:
@@ -59,13 +85,13 @@ class Box:
     @property
     def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
         """
-        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        (3,) centre of volume in the shape's frame, m. For a half-space: the boundary point nearest to the origin.
         """
 
     @property
     def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
-        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        (2, 3) lower and upper corner of the bounding box in the shape's frame, m; infinite for a half-space.
         """
 
     def __repr__(self) -> str: ...
@@ -76,9 +102,20 @@ class Box:
 
 class Capsule:
     """
-    All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.
+    All points within a distance of a segment on the z axis: a cylinder with half balls as ends.
 
-    As in pybullet, `length` lies between the centres of the caps; it may be 0.
+    Parameters
+    ----------
+    radius : float
+        Radius, m.
+    length : float
+        Length between the centres of the half balls as in pybullet, m. It may be 0.
+
+    Examples
+    --------
+    >>> from overlapper import Capsule
+    >>> Capsule(0.1, 0.4).bounds.round(6).tolist()
+    [[-0.1, -0.1, -0.3], [0.1, 0.1, 0.3]]
     """
 
     def __init__(self, radius: float, length: float) -> None: ...
@@ -87,11 +124,11 @@ class Capsule:
 
     @property
     def radius(self) -> float:
-        """m"""
+        """Radius, m."""
 
     @property
     def length(self) -> float:
-        """m, between the centres of the caps"""
+        """Length between the centres of the half balls, m."""
 
     @property
     def volume(self) -> float:
@@ -100,13 +137,13 @@ class Capsule:
     @property
     def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
         """
-        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        (3,) centre of volume in the shape's frame, m. For a half-space: the boundary point nearest to the origin.
         """
 
     @property
     def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
-        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        (2, 3) lower and upper corner of the bounding box in the shape's frame, m; infinite for a half-space.
         """
 
     def __repr__(self) -> str: ...
@@ -117,7 +154,20 @@ class Capsule:
 
 class Cylinder:
     """
-    A cylinder of `radius` (m) and `length` (m) along local z, about the origin.
+    A cylinder about the origin, along the z axis.
+
+    Parameters
+    ----------
+    radius : float
+        Radius, m.
+    length : float
+        Length along z, m.
+
+    Examples
+    --------
+    >>> from overlapper import Cylinder
+    >>> round(Cylinder(0.1, 0.4).volume, 6)
+    0.012566
     """
 
     def __init__(self, radius: float, length: float) -> None: ...
@@ -126,11 +176,11 @@ class Cylinder:
 
     @property
     def radius(self) -> float:
-        """m"""
+        """Radius, m."""
 
     @property
     def length(self) -> float:
-        """m"""
+        """Length along z, m."""
 
     @property
     def volume(self) -> float:
@@ -139,13 +189,13 @@ class Cylinder:
     @property
     def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
         """
-        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        (3,) centre of volume in the shape's frame, m. For a half-space: the boundary point nearest to the origin.
         """
 
     @property
     def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
-        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        (2, 3) lower and upper corner of the bounding box in the shape's frame, m; infinite for a half-space.
         """
 
     def __repr__(self) -> str: ...
@@ -156,10 +206,25 @@ class Cylinder:
 
 class Hull:
     """
-    The convex hull of (n, 3) points (m).
+    The convex hull of points.
 
-    Interior, duplicate and coplanar points are welcome; coplanar triangles become one facet. Raises
-    ValueError for fewer than four points, for points that are not finite and for points in one plane.
+    Points may lie inside the hull, occur twice or be coplanar. Coplanar triangles become one facet.
+
+    Parameters
+    ----------
+    vertices : (n, 3) array_like
+        Four points or more, m.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than four points, a point is not finite, or all points lie in one plane.
+
+    Examples
+    --------
+    >>> from overlapper import Hull
+    >>> round(Hull([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]).volume, 6)
+    0.166667
     """
 
     def __init__(self, vertices: numpy.typing.ArrayLike) -> None: ...
@@ -167,7 +232,7 @@ class Hull:
     @property
     def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
-        (n, 3) the corners only, m; without those that mere rounding lifts off a facet
+        (n, 3) vertices of the hull, m, without those that only rounding errors lift off a facet.
         """
 
     @property
@@ -184,14 +249,12 @@ class Hull:
 
     @property
     def corners(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
-        """
-        (n, 3) all corners of the hull of the points as given, without rounding, m
-        """
+        """(n, 3) all vertices of the exact hull of the given points, m."""
 
     @property
     def triangles(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, None), writable=False)]:
         """
-        (k, 3) indices of the corners of its surface before coplanar triangles are merged, counter-clockwise from outside.
+        (k, 3) triangles of the surface before coplanar triangles are merged: indices into corners, counter-clockwise from outside.
         """
 
     @property
@@ -201,13 +264,13 @@ class Hull:
     @property
     def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
         """
-        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        (3,) centre of volume in the shape's frame, m. For a half-space: the boundary point nearest to the origin.
         """
 
     @property
     def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
-        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        (2, 3) lower and upper corner of the bounding box in the shape's frame, m; infinite for a half-space.
         """
 
     def __repr__(self) -> str: ...
@@ -222,10 +285,23 @@ class Hull:
 
 class HalfSpace:
     """
-    The closed half-space { x : normal · x <= offset }.
+    The closed half-space of all points x with normal · x <= offset.
 
-    `normal` may have any length but 0. The half-space is what the two say as given, without rounding; the attributes
-    `normal` and `offset` are both divided by the length, which rounds.
+    The half-space is exactly that of the given numbers. The attributes `normal` and `offset` are divided by the length of
+    the normal, which rounds.
+
+    Parameters
+    ----------
+    normal : (3,) array_like
+        Normal out of the solid, of any length but 0.
+    offset : float
+        Offset along the normal as given, m if the normal has length 1.
+
+    Examples
+    --------
+    >>> from overlapper import HalfSpace, Placed, Sphere, distance
+    >>> distance(Placed(Sphere(0.1), (0, 0, 1)), HalfSpace([0, 0, 1], 0))
+    0.9
     """
 
     def __init__(self, normal: numpy.typing.ArrayLike, offset: float) -> None: ...
@@ -234,19 +310,19 @@ class HalfSpace:
 
     @property
     def normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(3,) unit, out of the solid"""
+        """(3,) unit vector out of the solid."""
 
     @property
     def offset(self) -> float:
-        """m along the unit normal"""
+        """Offset along the unit normal, m."""
 
     @property
     def given_normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(3,) as given, of any length"""
+        """(3,) normal as given, of any length."""
 
     @property
     def given_offset(self) -> float:
-        """As given, along the normal as given."""
+        """Offset as given, for the normal as given."""
 
     @property
     def volume(self) -> float:
@@ -255,13 +331,13 @@ class HalfSpace:
     @property
     def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
         """
-        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        (3,) centre of volume in the shape's frame, m. For a half-space: the boundary point nearest to the origin.
         """
 
     @property
     def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
-        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        (2, 3) lower and upper corner of the bounding box in the shape's frame, m; infinite for a half-space.
         """
 
     def __repr__(self) -> str: ...
@@ -272,22 +348,40 @@ class HalfSpace:
 
 class RoundedHull:
     """
-    All points within `radius` (m) of the convex hull of (n, 3) points (m).
+    All points within a distance of the convex hull of points.
 
-    The Minkowski sum of the hull and a ball: what Bullet collides with where a convex mesh has a margin. ValueError as
-    for Hull and Sphere. Method "paper" does not take it; more than two bodies that overlap, it among them, have
-    no certificate, and neither does it with an ellipsoid that it overlaps.
+    It is the Minkowski sum of the hull and a ball. Bullet collides with such shapes where a convex mesh has a margin. The
+    method 'paper' does not accept it. It has no certificate with an ellipsoid that it overlaps, nor among three or more
+    bodies that overlap.
+
+    Parameters
+    ----------
+    vertices : (n, 3) array_like
+        Four points or more, m.
+    radius : float
+        Radius of the ball, m.
+
+    Raises
+    ------
+    ValueError
+        If `Hull` refuses the points, or `Sphere` refuses the radius.
+
+    Examples
+    --------
+    >>> from overlapper import RoundedHull
+    >>> RoundedHull([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], 0.5).bounds.tolist()
+    [[-0.5, -0.5, -0.5], [1.5, 1.5, 1.5]]
     """
 
     def __init__(self, vertices: numpy.typing.ArrayLike, radius: float) -> None: ...
 
     @property
     def core(self) -> Hull:
-        """The hull that is rounded."""
+        """The hull inside, before rounding."""
 
     @property
     def radius(self) -> float:
-        """m"""
+        """Radius of the rounding, m."""
 
     @property
     def volume(self) -> float:
@@ -296,13 +390,13 @@ class RoundedHull:
     @property
     def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
         """
-        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        (3,) centre of volume in the shape's frame, m. For a half-space: the boundary point nearest to the origin.
         """
 
     @property
     def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
-        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        (2, 3) lower and upper corner of the bounding box in the shape's frame, m; infinite for a half-space.
         """
 
     def __repr__(self) -> str: ...
@@ -317,11 +411,22 @@ class RoundedHull:
 
 class Ellipsoid:
     """
-    An ellipsoid about the origin with half axes (m) along x, y, z.
+    An ellipsoid about the origin: all points with (x / a)² + (y / b)² + (z / c)² <= 1.
 
-    All points with (x / a)² + (y / b)² + (z / c)² <= 1. With equal half axes it answers as the sphere does. With a box, a
-    hull or a half-space, it is measured as a ball is, of which it is the image; with other round bodies, between polytopes,
-    as closely as `tolerance` asks.
+    An ellipsoid with equal half axes gives the results of the sphere. With a box, a hull or a half-space, an ellipsoid is
+    measured as the affine image of a ball. With other round bodies, it is measured between polytopes, as closely as
+    `tolerance` demands.
+
+    Parameters
+    ----------
+    half_axes : (3,) array_like
+        Half axes a, b, c along x, y, z, m.
+
+    Examples
+    --------
+    >>> from overlapper import Ellipsoid
+    >>> round(Ellipsoid([0.1, 0.1, 0.2]).volume, 6)
+    0.008378
     """
 
     def __init__(self, half_axes: numpy.typing.ArrayLike) -> None: ...
@@ -330,7 +435,7 @@ class Ellipsoid:
 
     @property
     def half_axes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(3,) m"""
+        """(3,) half axes, m."""
 
     @property
     def volume(self) -> float:
@@ -339,13 +444,13 @@ class Ellipsoid:
     @property
     def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
         """
-        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        (3,) centre of volume in the shape's frame, m. For a half-space: the boundary point nearest to the origin.
         """
 
     @property
     def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
-        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        (2, 3) lower and upper corner of the bounding box in the shape's frame, m; infinite for a half-space.
         """
 
     def __repr__(self) -> str: ...
@@ -358,9 +463,21 @@ class Placed:
     """
     A shape and where it is in the world.
 
-    position is (3,) in m. orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0, or a
-    scipy.spatial.transform.Rotation. The body is turned by M(q) / |q|² for the quaternion as given, without rounding. The
-    attribute `orientation` is divided by the length, which rounds.
+    Parameters
+    ----------
+    shape : shape or (n, 3) array_like
+        A shape without a pose, or points in m, which stand for their convex hull.
+    position : (3,) array_like, default (0, 0, 0)
+        Position of the shape's origin, m.
+    orientation : (4,) array_like or scipy.spatial.transform.Rotation, default (0, 0, 0, 1)
+        Quaternion x, y, z, w as in pybullet, of any length but 0. The exact rotation is M(q) / |q|² for the quaternion as
+        given. The attribute `orientation` is divided by the length, which rounds.
+
+    Examples
+    --------
+    >>> from overlapper import Placed, Sphere
+    >>> Placed(Sphere(0.5), position=(0, 0, 1)).bounds.tolist()
+    [[-0.5, -0.5, 0.5], [0.5, 0.5, 1.5]]
     """
 
     def __init__(self, shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
@@ -368,9 +485,24 @@ class Placed:
     @staticmethod
     def from_matrix(shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike, matrix: numpy.typing.ArrayLike) -> Placed:
         """
-        A shape placed by a homogeneous matrix (4, 4), as of trimesh: a rotation, and a position in m.
+        A shape placed by a homogeneous matrix, as used by trimesh.
 
-        ValueError if the matrix scales, shears or mirrors by more than 1e-6, or if its last row is not (0, 0, 0, 1).
+        Parameters
+        ----------
+        shape : shape or (n, 3) array_like
+            A shape without a pose, or points in m, which stand for their convex hull.
+        matrix : (4, 4) array_like
+            A rotation, and a position in m.
+
+        Returns
+        -------
+        Placed
+            The placed shape.
+
+        Raises
+        ------
+        ValueError
+            If the matrix scales, shears or mirrors by more than 1e-6, or if its last row is not (0, 0, 0, 1).
         """
 
     @property
@@ -378,27 +510,27 @@ class Placed:
 
     @property
     def position(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(3,) m"""
+        """(3,) position in the world, m."""
 
     @property
     def orientation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(4,) unit quaternion x, y, z, w"""
+        """(4,) unit quaternion x, y, z, w."""
 
     @property
     def given_orientation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(4,) x, y, z, w as given, of any length"""
+        """(4,) quaternion x, y, z, w as given, of any length."""
 
     @property
     def volume(self) -> float:
-        """m³; infinite for a half-space"""
+        """Volume in m³; infinite for a half-space."""
 
     @property
     def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(3,) in the world, m"""
+        """(3,) centre of volume in the world, m."""
 
     @property
     def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
-        """(2, 3) lower and upper corner of the box around it in the world, m"""
+        """(2, 3) lower and upper corner of the bounding box in the world, m."""
 
     def __repr__(self) -> str: ...
 
@@ -410,10 +542,10 @@ class Placed:
 
 class Errors:
     """
-    How far the figures of an Overlap may be off: bounds that hold, in the same units.
+    Error bounds of the quantities of an Overlap, in the same units. They are certified.
 
-    They rest on another way to the same figures, whose rounding is bounded from its operations, and on how far that and the
-    figures are apart.
+    Each quantity is computed in a second way, with bounds of its rounding errors. The error bound is the difference of the
+    two results, plus the bound of the second way.
     """
 
     @property
@@ -426,32 +558,34 @@ class Errors:
 
     @property
     def centroid(self) -> float | None:
-        """m: the true centroid is no farther away. None unless overlapping."""
+        """m, largest distance of the true centroid. None unless overlapping."""
 
     @property
     def inertia(self) -> float:
-        """m⁵, of each entry."""
+        """m⁵, for each entry."""
 
     @property
     def vertices(self) -> float | None:
         """
-        m: no point of the hull of the vertices is farther from the common set, and none of that from the hull. None unless
+        m, largest distance between the hull of the vertices and the common set (Hausdorff distance). None unless
         overlapping.
         """
 
     @property
     def gradient(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
-        (m, 6) m² and m³: of the length of the three numbers that they stand for, and so of each.
+        (m, 6) m² and m³. Each bounds the length of the error of three entries, and so the error of each entry.
 
-        Where facets of two bodies lie in one plane the volume has a slope to one side and another to the other, and what is
-        stated may be either: the error is then as large as the facet. Where surfaces are tangent, or nearly, rounding moves the
-        border between them by far more than itself.
+        Where facets of two bodies lie in one plane, the volume has two one-sided derivatives, and the gradient may be either.
+        The error bound is then as large as the facet. Where surfaces are nearly tangent, rounding errors move the border between
+        them much farther than their own size.
         """
 
     @property
     def depth(self) -> float | None:
-        """m. None for three or more bodies, as are the next two."""
+        """
+        m. None for three or more bodies. The same holds for `distance` and `witnesses`.
+        """
 
     @property
     def distance(self) -> float | None:
@@ -460,7 +594,7 @@ class Errors:
     @property
     def witnesses(self) -> float | None:
         """
-        m: by how much, both together, the witnesses are outside of their bodies and farther apart than the bodies are. 0 if
+        m, sum of the distances of the witness points from their bodies and of the error of their distance. 0 if
         overlapping.
         """
 
@@ -468,16 +602,16 @@ class Errors:
 
 class Overlap:
     """
-    What two or more convex shapes share. True only if they overlap.
+    The common set of two or more convex shapes. True only if they overlap.
 
-    Immutable; each quantity is computed when first asked for. SI units, world coordinates. For smooth shapes the
-    polytope contains the common set, as closely as `tolerance` asks.
+    An Overlap is immutable. Each quantity is computed at its first use. Units are SI. Coordinates are world coordinates. For
+    curved shapes, the polytope contains the common set, and is as close to it as `tolerance` demands.
     """
 
     @property
     def status(self) -> Literal['separated', 'touching', 'overlapping']:
         """
-        'touching' if rounding cannot tell whether the common set has an inside.
+        'touching' if rounding errors leave open whether the common set has a volume.
         """
 
     def __bool__(self) -> bool: ...
@@ -493,8 +627,8 @@ class Overlap:
     @property
     def converged(self) -> bool:
         """
-        False if the volume may be off by more than the fraction `tolerance`: where rounding, or the most planes that a
-        smooth shape is given, leave more in doubt. True of bodies that do not overlap.
+        Whether the relative error of the volume is at most `tolerance`. It may be larger by rounding errors, or by the
+        limit on the number of planes of a curved shape. True for bodies that do not overlap.
         """
 
     @property
@@ -503,24 +637,24 @@ class Overlap:
     @property
     def way(self) -> Literal['separation', 'clipping', 'tracing', 'closed form', 'slicing', 'dual hull', 'wide separation', 'wide clipping', 'wide dual hull', 'doubt', 'paper']:
         """
-        How the answer came: by which way the volume was measured, or the status found of bodies that do not overlap.
+        How the result was computed: the way that found the volume, or the status of bodies that do not overlap.
 
-        'separation': doubles prove a gap. 'clipping': corners of each body held against the planes of the other. 'tracing': the
-        seam of two surfaces followed from facet to facet. 'closed form': a formula. 'slicing': slices of
-        round bodies, integrated. 'dual hull': the convex hull of dual points. 'wide ...': the same in double-doubles, where doubles are not
-        enough. 'doubt': not even these tell whether there is an inside, so that the bodies are said to touch. 'paper': the
-        method asked for.
+        'separation': doubles prove a gap. 'clipping': the vertices of each body are compared with the planes of the other.
+        'tracing': the curve where two surfaces meet is followed from facet to facet. 'closed form': a formula. 'slicing':
+        integrated slices of round bodies. 'dual hull': the convex hull of dual points. 'wide ...': the same in double-double
+        arithmetic, where doubles are not accurate enough. 'doubt': double-doubles leave open whether there is a common volume,
+        so the status is 'touching'. 'paper': the method `paper`.
         """
 
     @property
     def facets_touched(self) -> int:
-        """How many planes of the shapes took part in the measures."""
+        """Number of planes of the shapes that took part in the measures."""
 
     @property
     def errors(self) -> Errors:
         """
-        How far each figure may be off, as `volume_error` is that of the volume. It costs about as much as all figures
-        together.
+        Error bound of each quantity, as `volume_error` is that of the volume. They take about as long as all
+        quantities together.
         """
 
     @property
@@ -532,19 +666,18 @@ class Overlap:
         """
         m³, certified: the true volume is within volume ± volume_error.
 
-        For polyhedra it bounds the rounding: every plane moved by 16 half-ulps of the coordinates' magnitude, times the
-        area. Where a formula gives the measures of a pair with a round body, it is that, too; where slices do, what is left of
-        the series over them, the rounding of their lines, and what area vectors, which sum to zero over a closed surface, leave
-        open. For others with smooth shapes it is the share of the volume between an outer and an inner polytope, plus that. A
-        pair that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
-        difference from what 'auto' finds, plus the error of that. 0 if separated.
+        For polyhedra and formulas it bounds the rounding errors: every plane is moved by 16 half-ulps of the coordinates'
+        magnitude, times the area. For slices it is the remainder of the series, the rounding errors of their lines, and the sum
+        of the area vectors, which is zero for a closed surface. For other curved shapes it is the volume between an outer and an
+        inner polytope, plus rounding errors. A pair that touches may have a volume of the size of rounding errors. For method
+        'paper' it is the difference from the volume of 'auto', plus the error bound of 'auto'. 0 if separated.
         """
 
     @property
     def widened(self) -> bool:
         """
-        True if double arithmetic could not place the volume within 1e-12 of itself, and it was computed again in wider
-        arithmetic from the shapes' own numbers, as were centroid, area, inertia and gradient.
+        True if double arithmetic could not bound the relative error of the volume by 1e-12. Volume, centroid, area,
+        inertia and gradient were then computed again in double-double arithmetic, from the shapes as given.
         """
 
     @property
@@ -570,7 +703,7 @@ class Overlap:
 
     @property
     def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
-        """(n, 3) corners of the common polytope, m; empty unless overlapping."""
+        """(n, 3) vertices of the common polytope, m; empty unless overlapping."""
 
     @property
     def faces(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, None), writable=False)]:
@@ -592,46 +725,47 @@ class Overlap:
 
     @property
     def owner(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None,), writable=False)]:
-        """(f,) which of the shapes each facet belongs to."""
+        """(f,) index of the shape that each facet belongs to."""
 
     @property
     def patch(self) -> list[numpy.typing.NDArray[numpy.float64]]:
         """
-        Closed polygons (k, 3) along the ridges where the owner changes, the first point not repeated. For a pair they go
-        counter-clockwise around a's part of the surface; for more bodies, around the part of each.
+        Closed polygons (k, 3) along the edges where the owner changes, m. The first point is not repeated. For a pair,
+        they go counter-clockwise around a's part of the surface. For more bodies, they go around the part of each.
         """
 
     @property
     def patch_area(self) -> numpy.typing.NDArray[numpy.float64] | None:
         """
-        (3,) m², the area vector of b's part of the surface, which points to a as `normal` does: its length is the area within
-        `patch`, seen along it, and for small overlaps what the volume grows by per metre of depth. The same as gradient[1, :3],
-        and opposite to gradient[0, :3]; zeros unless overlapping. None for three or more bodies, as are the next three.
+        (3,) m², the area vector of b's part of the surface. It points to a, as `normal` does. Its length is the area within
+        `patch`, projected along it. For small overlaps it is the derivative of the volume by the depth. It equals
+        gradient[1, :3] and -gradient[0, :3]. Zeros unless overlapping. None for three or more bodies. The same holds for
+        `patch_centre`, `patch_moments` and `patch_distance`.
         """
 
     @property
     def patch_centre(self) -> numpy.typing.NDArray[numpy.float64] | None:
         """
-        (3,) m, the centre of that area, in the plane through the centroid of the volume. None, too, without an area: unless
-        the bodies overlap, and of a body inside the other.
+        (3,) m, the centre of that area, in the plane through the centroid of the volume. None also without an area: if the
+        bodies do not overlap, or one body is inside the other.
         """
 
     @property
     def patch_moments(self) -> numpy.typing.NDArray[numpy.float64] | None:
         """
-        (3, 3) m⁴, ∫ x xᵀ dA of that area about its centre, world axes; nothing along the area vector. Its eigenvectors and the
-        roots of its eigenvalues over the area are the axes of the patch and its radii of gyration. Where formulas or slices
-        measure round bodies it is that of the round patch, not of polygons.
+        (3, 3) m⁴, ∫ x xᵀ dA of that area about its centre, world axes; zero along the area vector. Its eigenvectors are the
+        axes of the patch. The square roots of its eigenvalues divided by the area are the radii of gyration. Where formulas or
+        slices measure round bodies, it is that of the round patch, not of polygons.
         """
 
     @property
     def patch_distance(self) -> float | None:
         """
-        m, how far the points of that area are on the average from the centroid of the volume, in the plane through it:
-        with friction mu and a normal force N, the torque that resists spinning is at most mu * N * patch_distance. Exact of
-        polyhedra, discs and ellipses. Where formulas or slices measure round bodies, other patches count as the ellipse that
-        has the same centre and moments: of a long rectangle that is 2 % less than the truth, of a stadium within 1 %, of a half
-        disc within 2 %, of a triangle 2 % more, and of a thin ring 6 % less. None without an area, as the centre.
+        m, mean distance of the points of that area from the centroid of the volume, in the plane through it. With friction
+        mu and a normal force N, the torque that resists spinning is at most mu * N * patch_distance. It is exact for polyhedra,
+        discs and ellipses. Where formulas or slices measure round bodies, other patches count as the ellipse with the same
+        centre and moments. That is 2 % too small for a long rectangle, within 1 % for a stadium, within 2 % for a half disc,
+        2 % too large for a triangle, and 6 % too small for a thin ring. None without an area.
         """
 
     @property
@@ -643,20 +777,20 @@ class Overlap:
     @property
     def normal(self) -> numpy.typing.NDArray[numpy.float64] | None:
         """
-        (3,) unit, from b to a as pybullet's contactNormalOnB: moving a by depth * normal separates an overlapping
-        pair. Also given for pairs that touch or are apart. None for three or more bodies.
+        (3,) unit vector from b to a, as pybullet's contactNormalOnB. Moving a by depth * normal separates an overlapping
+        pair. Pairs that touch or are separated have a normal, too. None for three or more bodies.
         """
 
     @property
     def depth(self) -> float | None:
         """
-        m, the least translation that separates the pair; 0 unless overlapping. None for three or more bodies.
+        m, length of the shortest translation that separates the pair; 0 unless overlapping. None for three or more bodies.
         """
 
     @property
     def distance(self) -> float | None:
         """
-        m between the nearest points; 0 unless separated. None for three or more bodies.
+        m, between the nearest points; 0 unless separated. None for three or more bodies.
         """
 
     @property
@@ -679,10 +813,19 @@ class Overlap:
 
     def certificate(self) -> Any:
         """
-        What proves the status, and bounds of the volume, to somebody who does not trust us: an overlapper.proof.claims.Certificate.
+        A certificate that proves the status and bounds of the volume.
 
-        `verify()` of it checks everything in rational arithmetic without the core, and returns (lower, upper) bounds of the common
-        volume in m³. Raises CertificateError where there is none.
+        Its `verify()` checks everything in rational arithmetic, without the core.
+
+        Returns
+        -------
+        overlapper.proof.claims.Certificate
+            `verify()` returns (lower, upper) bounds of the common volume in m³.
+
+        Raises
+        ------
+        overlapper.proof.claims.CertificateError
+            If there is no certificate.
         """
 
     def __copy__(self) -> object: ...
@@ -701,44 +844,110 @@ def overlap(*shapes: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | Roun
     """
     The common set of two or more convex shapes.
 
-        lens = overlap(Sphere(0.5), Placed(Sphere(0.5), position=(0.6, 0, 0)))
-        lens.volume, lens.volume_error, lens.depth, lens.normal
+    >>> from overlapper import Placed, Sphere, overlap
+    >>> lens = overlap(Sphere(0.5), Placed(Sphere(0.5), position=(0.6, 0, 0)))
+    >>> round(lens.volume, 6), round(lens.depth, 6), lens.normal.tolist()
+    (0.108909, 0.4, [-1.0, 0.0, 0.0])
 
-    Each of `shapes` is a shape, a Placed, or an (n, 3) array of points, which stands for their convex hull. `tolerance`, between
-    0 and 1, is the allowed relative error of the volume for curved shapes. `converged` is False if it was not reached.
-    Polyhedra are exact and ignore it. No overlap is an answer, not an error. Raises ValueError if the common set is unbounded.
+    Parameters
+    ----------
+    *shapes : shape, Placed or (n, 3) array_like
+        Two or more bodies. A bare shape lies at the origin. Points in m stand for their convex hull.
+    tolerance : float, default 0.001
+        Allowed relative error of the volume for curved shapes, between 0 and 1. Polyhedra are exact and ignore it.
+    method : {'auto', 'paper'}, default 'auto'
+        'auto' tries the ways of `Overlaps.WAYS`. 'paper' follows the article of Tereshchenko, Chevokin and Fisunenko,
+        'Algorithm for finding the domain intersection of a set of polytopes' (ICCS 2013). docs/how.md has its steps.
 
-    `method` 'auto' tries the ways of `Overlaps.WAYS` and always returns an answer. `method` 'paper' follows the article of
-    Tereshchenko, Chevokin and Fisunenko, 'Algorithm for finding the domain intersection of a set of polytopes' (ICCS 2013). GJK
-    finds a common point. A point on a boundary is shifted by 2^-26 of the smaller polytope in one of 26 directions. If no
-    shifted point is inside both bodies, the status is 'touching'. The convex hull of the dual points of all face planes follows,
-    then its dual. More than two bodies are intersected in pairs, by divide and conquer. Three things differ from the article:
-    curved shapes are replaced by inscribed polytopes, half-spaces by large boxes, and hulls use exact predicates.
+    Returns
+    -------
+    Overlap
+        SI units, world coordinates. No overlap is a result, not an error: `bool(result)` is False.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two shapes, or if the common set is unbounded.
     """
 
 def distance(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike) -> float:
     """
-    Distance (m) between the nearest points of two shapes. 0 if they touch or overlap.
+    Distance between the nearest points of two shapes.
+
+    Parameters
+    ----------
+    a, b : shape, Placed or (n, 3) array_like
+        The two bodies.
+
+    Returns
+    -------
+    float
+        Distance in m. 0 if the bodies touch or overlap.
+
+    Examples
+    --------
+    >>> from overlapper import Box, Placed, distance
+    >>> distance(Box([0.5, 0.5, 0.5]), Placed(Box([0.5, 0.5, 0.5]), (1.25, 0, 0)))
+    0.25
     """
 
 def penetration_depth(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike) -> float:
     """
-    Length (m) of the shortest translation that separates two shapes. 0 if they do not overlap. Positive where pybullet's
-    contact distance is negative. Raises ValueError for two half-spaces.
+    Length of the shortest translation that separates two shapes.
+
+    Parameters
+    ----------
+    a, b : shape, Placed or (n, 3) array_like
+        The two bodies.
+
+    Returns
+    -------
+    float
+        Depth in m. It is positive where pybullet's contact distance is negative. 0 if the bodies do not overlap.
+
+    Raises
+    ------
+    ValueError
+        If both bodies are half-spaces.
+
+    Examples
+    --------
+    >>> from overlapper import Box, Placed, penetration_depth
+    >>> penetration_depth(Box([0.5, 0.5, 0.5]), Placed(Box([0.5, 0.5, 0.5]), (0.75, 0, 0)))
+    0.25
     """
 
 def iou(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001) -> float:
     """
-    Intersection over union of two shapes: the common volume divided by the volume of the union, from 0 to 1.
+    Intersection over union of two shapes: the common volume divided by the volume of the union.
+
+    Parameters
+    ----------
+    a, b : shape, Placed or (n, 3) array_like
+        The two bodies.
+    tolerance : float, default 0.001
+        Allowed relative error of the common volume for curved shapes, between 0 and 1.
+
+    Returns
+    -------
+    float
+        The ratio, from 0 to 1.
+
+    Examples
+    --------
+    >>> from overlapper import Box, Placed, iou
+    >>> round(iou(Box([0.5, 0.5, 0.5]), Placed(Box([0.5, 0.5, 0.5]), (0.5, 0, 0))), 12)
+    0.333333333333
     """
 
 class Overlaps:
     """
-    What many pairs of shapes share: an array per quantity, a row per pair. SI units, world coordinates.
+    Overlaps of many pairs of shapes: an array for each quantity, with a row for each pair.
 
-    The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again
-    unless it took long and its Batch has not been asked since; `overlaps[mask]`, a slice or an array of indices picks rows.
-    A pickle has the shapes and their poses, of which the rows are computed again, to the same bits.
+    Units are SI. Coordinates are world coordinates. The arrays are read-only views. `overlaps[i]` is the Overlap of row i,
+    with all its quantities. It is computed again, unless that took long and its Batch was not called since.
+    `overlaps[mask]`, a slice or an array of indices selects rows. A pickle has the shapes and poses. The rows are computed
+    again from them, bit-identically.
     """
 
     @property
@@ -752,7 +961,7 @@ class Overlaps:
     @property
     def way(self) -> numpy.typing.NDArray[numpy.int8]:
         """
-        (p,) how the answer came: a place in Overlaps.WAYS, which has the names of Overlap.way.
+        (p,) how the result was computed: an index into Overlaps.WAYS, which has the names of Overlap.way.
         """
 
     @property
@@ -765,9 +974,7 @@ class Overlaps:
 
     @property
     def centroid(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (p, 3) centre of the common volume, m; not a number unless overlapping.
-        """
+        """(p, 3) centre of the common volume, m; NaN unless overlapping."""
 
     @property
     def area(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -782,7 +989,7 @@ class Overlaps:
     @property
     def depth(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (p,) m, the least translation that separates the pair, of a along normal; 0 unless overlapping.
+        (p,) m, length of the shortest translation that separates the pair; 0 unless overlapping.
         """
 
     @property
@@ -794,11 +1001,13 @@ class Overlaps:
 
     @property
     def facets_touched(self) -> numpy.typing.NDArray[numpy.int32]:
-        """(p,) how many planes of the shapes took part in building the polytope."""
+        """(p,) number of planes of the shapes that took part in the measures."""
 
     @property
     def widened(self) -> numpy.typing.NDArray[numpy.bool_]:
-        """(p,) True where the volume was computed again in wider arithmetic."""
+        """
+        (p,) True where the volume was computed again in double-double arithmetic.
+        """
 
     @property
     def patch_area(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -809,8 +1018,8 @@ class Overlaps:
     @property
     def patch_centre(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (p, 3) m, the centre of that area in the plane through the centroid; not a number without an area. It, the
-        moments and the distance take some microseconds a pair when one of them is first asked for.
+        (p, 3) m, the centre of that area in the plane through the centroid; NaN without an area. The
+        first use of the centre, the moments or the distance takes some microseconds for each pair.
         """
 
     @property
@@ -822,7 +1031,7 @@ class Overlaps:
     @property
     def patch_distance(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (p,) m, how far points of that area are on the average from the centroid, seen along the area vector; not a number
+        (p,) m, mean distance of the points of that area from the centroid, seen along the area vector; NaN
         without an area.
         """
 
@@ -836,13 +1045,15 @@ class Overlaps:
 
     @property
     def examined(self) -> int:
-        """How many pairs were looked at: those given, or those whose boxes meet."""
+        """
+        Number of pairs that were examined: the given pairs, or those whose bounding boxes meet.
+        """
 
     @property
     def planes_asked(self) -> int:
         """
-        How many planes of the shapes were asked for in that call: placed to be held against corners, or given by a shape
-        as an answer to where a ray leaves it or which of its planes is tightest about a point.
+        Number of planes of the shapes that the call computed: to compare with vertices, to find where a ray leaves a
+        shape, or to find the plane nearest to a point.
         """
 
     @property
@@ -863,12 +1074,24 @@ class Overlaps:
 
 class Batch:
     """
-    Shapes that are asked for their overlaps again and again as they move.
+    Shapes whose overlaps are measured again and again while they move.
 
-    `overlaps` is the function of that name for these shapes. What it finds is kept for its next call: pairs of which
-    neither has moved by a bit cost nothing, and pairs that are still apart along the same axis next to nothing. The
-    answers are those of a first call to the last bit. Threads that ask at the same time get their answers without waiting.
-    A pickle has the shapes alone.
+    Results are reused in the next call. A pair whose poses are bit-identical costs no time. A pair that is still separated
+    along the same axis costs little time. All results are bit-identical to those of a first call. Several threads may call
+    at the same time. A pickle has only the shapes.
+
+    Parameters
+    ----------
+    shapes : sequence of shapes
+        The k shapes, without poses.
+
+    Examples
+    --------
+    >>> from overlapper import Batch, Sphere
+    >>> batch = Batch([Sphere(0.5), Sphere(0.5)])
+    >>> found = batch.overlaps([[0, 0, 0], [0.5, 0, 0]], [[0, 0, 0, 1], [0, 0, 0, 1]])
+    >>> found.pairs.tolist(), found.volume.round(6).tolist()
+    ([[0, 1]], [0.163625])
     """
 
     def __init__(self, shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid]) -> None: ...
@@ -881,46 +1104,112 @@ class Batch:
 
     def overlaps(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
         """
-        What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
-        gradient as arrays.
+        Overlaps of many pairs of placed shapes in one call, as arrays. Other Python threads run meanwhile.
 
-        `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs`
-        (p, 2) indexes them and has a row each in the answer, or with separated=False only those that overlap or touch; without
-        it there is a row for each pair that overlaps or touches, found by a tree of boxes and sorted. `tolerance` and `method`
-        are those of `overlap`, whose answers these are to the last bit. The work is spread over `threads`, None being all that
-        there are; their number does not change a bit of the answer.
+        Parameters
+        ----------
+        positions : (k, 3) array_like
+            Positions of the shapes, m.
+        orientations : (k, 4) array_like
+            Quaternions x, y, z, w of the shapes, of any length but 0.
+        pairs : (p, 2) array_like of int, optional
+            Indices of the shapes of each pair. Default: all pairs that overlap or touch, sorted.
+        tolerance : float, default 0.001
+            Allowed relative error of the volume for curved shapes, between 0 and 1. Polyhedra are exact and ignore it.
+        threads : int or None, default 1
+            Number of threads. None: one on each core. The number does not change a bit of the results.
+        method : {'auto', 'paper'}, default 'auto'
+            Method of computation, as in `overlap`.
+        separated : bool, default True
+            Whether `pairs` that are separated have rows, too.
 
-        Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
-        Raises ValueError naming an argument of the wrong shape, a pose that is not finite, or half-spaces whose common set is
-        unbounded.
+        Returns
+        -------
+        Overlaps
+            A row for each pair, bit-identical to what `overlap` returns for the pair.
+
+        Raises
+        ------
+        ValueError
+            If an argument has the wrong shape, a pose is not finite, or half-spaces have an unbounded common set.
+        KeyboardInterrupt
+            After Ctrl-C. Its attribute `overlaps` has the rows that were finished.
         """
 
     def candidate_pairs(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
         """
-        (p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
-        two half-spaces are no pair.
+        Pairs of shapes whose bounding boxes in the world meet.
+
+        A half-space meets a box that reaches into it. Two half-spaces are not a pair.
+
+        Parameters
+        ----------
+        positions : (k, 3) array_like
+            Positions of the shapes, m.
+        orientations : (k, 4) array_like
+            Quaternions x, y, z, w of the shapes, of any length but 0.
+
+        Returns
+        -------
+        (p, 2) ndarray of int32
+            Indices i < j of the two shapes, sorted.
         """
 
 def overlaps(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
     """
-    What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
-    gradient as arrays.
+    Overlaps of many pairs of placed shapes in one call, as arrays. Other Python threads run meanwhile.
 
-    `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs`
-    (p, 2) indexes them and has a row each in the answer, or with separated=False only those that overlap or touch; without
-    it there is a row for each pair that overlaps or touches, found by a tree of boxes and sorted. `tolerance` and `method`
-    are those of `overlap`, whose answers these are to the last bit. The work is spread over `threads`, None being all that
-    there are; their number does not change a bit of the answer.
+    Parameters
+    ----------
+    shapes : sequence of shapes
+        The k shapes, without poses.
+    positions : (k, 3) array_like
+        Positions of the shapes, m.
+    orientations : (k, 4) array_like
+        Quaternions x, y, z, w of the shapes, of any length but 0.
+    pairs : (p, 2) array_like of int, optional
+        Indices of the shapes of each pair. Default: all pairs that overlap or touch, sorted.
+    tolerance : float, default 0.001
+        Allowed relative error of the volume for curved shapes, between 0 and 1. Polyhedra are exact and ignore it.
+    threads : int or None, default 1
+        Number of threads. None: one on each core. The number does not change a bit of the results.
+    method : {'auto', 'paper'}, default 'auto'
+        Method of computation, as in `overlap`.
+    separated : bool, default True
+        Whether `pairs` that are separated have rows, too.
 
-    Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
-    Raises ValueError naming an argument of the wrong shape, a pose that is not finite, or half-spaces whose common set is
-    unbounded.
+    Returns
+    -------
+    Overlaps
+        A row for each pair, bit-identical to what `overlap` returns for the pair.
+
+    Raises
+    ------
+    ValueError
+        If an argument has the wrong shape, a pose is not finite, or half-spaces have an unbounded common set.
+    KeyboardInterrupt
+        After Ctrl-C. Its attribute `overlaps` has the rows that were finished.
     """
 
 def candidate_pairs(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
     """
-    (p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
-    two half-spaces are no pair.
+    Pairs of shapes whose bounding boxes in the world meet.
+
+    A half-space meets a box that reaches into it. Two half-spaces are not a pair.
+
+    Parameters
+    ----------
+    shapes : sequence of shapes
+        The k shapes, without poses.
+    positions : (k, 3) array_like
+        Positions of the shapes, m.
+    orientations : (k, 4) array_like
+        Quaternions x, y, z, w of the shapes, of any length but 0.
+
+    Returns
+    -------
+    (p, 2) ndarray of int32
+        Indices i < j of the two shapes, sorted.
     """
 
 def world_poses(frames: Sequence[Any], which: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
