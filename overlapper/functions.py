@@ -25,7 +25,7 @@ def introspect(kind: type) -> None:
         if hasattr(member, "__nb_signature__") and not name.startswith("_"):
             make = _core.method if type(member).__name__ == "nb_method" else _core.function
             setattr(kind, name, _described(member, make, f"{kind.__name__}."))
-    if "__init__" in vars(kind):
+    if hasattr(vars(kind).get("__init__"), "__nb_signature__"):
         kind.__signature__ = _Constructor()  # type: ignore[attr-defined]
         _core.explain_constructor(kind)
 
@@ -53,6 +53,8 @@ class _Constructor:
     """The signature of a class, made when it is asked for."""
 
     def __get__(self, instance: object, owner: Any) -> inspect.Signature:
+        if not hasattr(owner.__init__, "__nb_signature__"):
+            raise AttributeError("__signature__")  # a class of users, with a constructor of its own
         found = signature(owner.__init__)
         return found.replace(parameters=[*found.parameters.values()][1:])
 

@@ -92,9 +92,9 @@ inline constexpr std::tuple kColumns{
     Column<std::int8_t>{"status", &Overlaps::status,
                         [](const Overlaps::Row& row) { return static_cast<std::int8_t>(row.measures.status); },
                         "(p,) Overlaps.SEPARATED (0), TOUCHING (1) or OVERLAPPING (2)."},
-    Column<std::int8_t>{"way", &Overlaps::way,
-                        [](const Overlaps::Row& row) { return static_cast<std::int8_t>(row.measures.way); },
-                        "(p,) how the result was computed: an index into Overlaps.WAYS, which has the names of Overlap.way."},
+    Column<std::int8_t>{
+        "way", &Overlaps::way, [](const Overlaps::Row& row) { return static_cast<std::int8_t>(row.measures.way); },
+        "(p,) how the result was computed: an index into Overlaps.WAYS, which has the names of Overlap.way."},
     Column<double>{"volume", &Overlaps::volume, [](const Overlaps::Row& row) { return row.measures.volume; },
                    "(p,) m³; 0 unless overlapping."},
     Column<double>{"volume_error", &Overlaps::volume_error,

@@ -144,6 +144,15 @@ def test_a_class_has_a_signature_with_types(kind):
     assert all(each.annotation is not each.empty for each in parameters.values())
 
 
+def test_a_class_of_users_has_the_signature_of_its_own_constructor():
+    class Scene(overlapper.Batch):
+        def __init__(self, count: int) -> None:
+            super().__init__([Sphere(1)] * count)
+
+    assert [*inspect.signature(Scene).parameters] == ["count"]
+    assert len(Scene(3).candidate_pairs(np.zeros((3, 3)), np.tile([0, 0, 0, 1.0], (3, 1)))) == 3
+
+
 @pytest.mark.parametrize("name", [name for name in CALLS if "." in name])
 def test_a_method_is_found_by_inspect_and_pydoc(name):
     method = CALLS[name]
