@@ -210,10 +210,12 @@ def _judged(overlap: Overlap, theirs: Figures | None, end: str | None) -> Compar
         asked = "whether they overlap" if theirs is None else "for the signed distance"
         return Comparison("crashed", ours, theirs, f"FCL {end} when asked {asked}: by us {ours}, {truth}.", None, exact)
     if difference <= FCL_TOLERANCE and max(map(abs, exact)) <= FCL_TOLERANCE:
-        words = f"{claims}, {truth}: touching, as far as FCL's tolerance of {FCL_TOLERANCE:g} m goes."
+        words = f"{claims}, {truth}: touching within FCL's tolerance of {FCL_TOLERANCE:g} m."
         return Comparison("agree", ours, theirs, words, None, exact)
     nearer = _nearer(ours, theirs, exact)
-    words = {"ours": "so ours is nearer", "fcl": "so FCL is nearer", None: "which cannot tell who is nearer"}[nearer]
+    words = {"ours": "so ours is nearer", "fcl": "so FCL is nearer", None: "which does not decide which is nearer"}[
+        nearer
+    ]
     return Comparison("disagree", ours, theirs, f"{claims}, {truth}, {words}.", nearer, exact)
 
 

@@ -94,7 +94,9 @@ def asset_files(folder: Path) -> list[Path]:
         and (path.suffix.lower() != ".xml" or _is_mjcf(path))
     )
     if not found:
-        raise ValueError(f"there is no model and no mesh in the folder {folder}: {', '.join((*ENDINGS, *MESHES))}")
+        raise ValueError(
+            f"the folder {folder} has no model and no mesh with one of the endings {', '.join((*ENDINGS, *MESHES))}"
+        )
     return found
 
 
@@ -189,7 +191,7 @@ def _mesh(name: str, path: Path, units: str, least_depth: float, modelling: Mode
         closed = closed and surface.volume is not None and not surface.open_edges
         try:
             if modelling.concave == "skip" and not surface.convex_bodies():
-                raise NotDecomposed("the mesh is concave, and --concave skip asks to leave it out")
+                raise NotDecomposed("the mesh is concave, and --concave skip leaves out concave meshes")
             made = decompose(part.triangles, modelling.concave_threshold, modelling.concave == "enclose")
             placed = [Hull(part.placed(each.vertices)) for each in made.parts]
         except ValueError as error:

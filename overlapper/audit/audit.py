@@ -120,7 +120,7 @@ def _tallies(examiner: Examiner, engine: Executor | None) -> Iterator[Tally]:
     job = Job("overlapper.audit.examiner", "prepared", examiner.setup)
     for block, outcome in outcomes(engine, job, blocks):
         if isinstance(outcome, Failed):
-            raise RuntimeError(f"configurations of block {block}: {outcome.sentence}\n{outcome.traceback}")
+            raise RuntimeError(f"block {block} of configurations failed: {outcome.sentence}\n{outcome.traceback}")
         yield outcome.value
 
 

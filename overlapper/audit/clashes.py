@@ -153,7 +153,7 @@ def _files(path: Path) -> list[Path]:
         if each.suffix.lower() in (*BODIES, *ASSEMBLIES) and not each.name.startswith(".") and each.is_file()
     )
     if not found:
-        raise ValueError(f"there is no mesh in the folder {path}: {', '.join((*BODIES, *ASSEMBLIES))}")
+        raise ValueError(f"the folder {path} has no mesh with one of the endings {', '.join((*BODIES, *ASSEMBLIES))}")
     return found
 
 
@@ -362,7 +362,7 @@ def _decompose(found: Clashes, needed: set[int], threshold: float, enclose: bool
                 found.failures.append(f"{body.name} is not measured: {error}")
                 found.bodies[i] = replace(body, way="unknown")
             else:
-                found.remarks.append(f"The convex hull stands for {body.name}: {error}.")
+                found.remarks.append(f"The convex hull of {body.name} is used instead: {error}.")
 
 
 def _clash(

@@ -30,9 +30,9 @@ def _wrong(audited: PairAudit, reason: str | None) -> list[str]:
     """The sentence on a faulty pair that overlaps, or no sentence; `reason` is why a file disables the pair."""
     names, adjacent = " and ".join(audited.names), audited.pair.adjacent
     if audited.status == "always" and not adjacent and reason != "Always":
-        return [f"{names} always overlap, and no joint ties them."]
+        return [f"{names} always overlap, and no joint connects them."]
     if reason == "Never":
-        return [f"{names} never overlap by the SRDF file, and do {_how_often(audited)}."]
+        return [f"{names} never overlap by the SRDF file, but overlap {_how_often(audited)}."]
     if reason is None or adjacent or audited.status == "always":
         return []
     why = f"as {reason!r}" if reason else "without a reason"
@@ -45,10 +45,10 @@ def remarks(robot: Robot) -> list[str]:
     lines = [f"Concave: {name} is {link.concave} convex parts." for name, link in links if link.concave]
     for kind, name in robot.unmoved:
         why = "pybullet does not move it" if kind == "planar" else "it has no limits"
-        lines.append(f"The {kind} joint {name} stays where it is, as {why}.")
+        lines.append(f"The {kind} joint {name} stays at rest, because {why}.")
     return [*lines, *robot.notes]
 
 
 def _how_often(audited: PairAudit) -> str:
     assert audited.largest
-    return f"in {audited.met:,} of {audited.asked:,} configurations, at first in number {audited.largest.number:,}"
+    return f"in {audited.met:,} of {audited.asked:,} configurations, first in number {audited.largest.number:,}"

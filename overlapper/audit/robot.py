@@ -152,7 +152,7 @@ def _compiled(path: Path, modelling: Modelling) -> Robot:
     if not path.is_file():
         raise NotRead(f"there is no file {path}")
     if modelling.surface != "nominal":
-        raise NotRead(f"{path} is read by MuJoCo, which has no surface but 'nominal'")
+        raise NotRead(f"{path} is read by MuJoCo, which has only the surface 'nominal'")
     try:
         found = _reading(read_mechanism, path)
     except Unanswered as error:
@@ -178,7 +178,7 @@ def _answers(request: tuple[Path, Modelling]) -> Generator[Robot | str, None, No
             yield Robot(root.get("name") or tree.bodies[0], tree, _mimics(root, tree))
         else:
             tied = root.find("equality/*") is not None
-            notes = ("The <equality> of the file is not read: what it ties moves freely.",) if tied else ()
+            notes = ("The <equality> of the file is not read: the joints that it couples move freely.",) if tied else ()
             yield Robot(tree.bodies[0], tree, {}, notes)
     except (NotRead, ValueError) as error:
         yield str(error)
@@ -193,7 +193,7 @@ def _mimics(root: ElementTree.Element, tree: KinematicTree) -> dict[str, Mimic]:
             continue
         leader = str(mimic.get("joint"))
         if kinds.get(leader) not in ("revolute", "prismatic"):
-            raise NotRead(f"the joint {name!r} mimics {leader!r}, which is no joint that one number moves")
+            raise NotRead(f"the joint {name!r} mimics {leader!r}, which is not a revolute or prismatic joint")
         multiplier, offset = (float(mimic.get(key, default)) for key, default in (("multiplier", 1), ("offset", 0)))
         found[name] = Mimic(leader, multiplier, offset)
     return {name: _followed(name, found) for name in found}

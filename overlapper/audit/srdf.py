@@ -62,14 +62,16 @@ def _write(root: ElementTree.Element, path: Path) -> None:
 def read_srdf(path: Path) -> dict[Names, str]:
     """The pairs that an SRDF file disables, with its reasons. OSError if the file is missing, ValueError if invalid."""
     if path.exists() and not path.is_file():
-        raise ValueError(f"{path} is no SRDF, and no file")
+        raise ValueError(f"there is no SRDF file {path}")
     try:
         root = ElementTree.parse(path).getroot()
     except (ElementTree.ParseError, ValueError) as error:
-        raise ValueError(f"{path} is no SRDF: {first_line(error)}") from error
+        raise ValueError(f"{path} is not an SRDF file: {first_line(error)}") from error
     if root.tag != "robot":
-        raise ValueError(f"{path} is no SRDF: it is of <{root.tag}> and not of <robot>")
+        raise ValueError(f"{path} is not an SRDF file: its root is <{root.tag}>, not <robot>")
     pairs = [each.attrib for each in root.findall("disable_collisions")]
     if missing := [each for each in pairs if not each.get("link1") or not each.get("link2")]:
-        raise ValueError(f"{path} is no SRDF: a <disable_collisions> names no two links, but {dict(missing[0])}")
+        raise ValueError(
+            f"{path} is not an SRDF file: a <disable_collisions> must name link1 and link2, not {dict(missing[0])}"
+        )
     return {frozenset((each["link1"], each["link2"])): each.get("reason", "") for each in pairs}

@@ -59,23 +59,23 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def overlapper(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and leave.")
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """The volume that the bodies of a pybullet simulation have in common, pair by pair.
+    """Measure the overlaps of bodies in simulations, meshes and robots: volume, depth, centroid and error bounds.
 
-    Start with [bold]overlapper scenes[/bold], then run one of them:
+    List the sample scenes with [bold]overlapper scenes[/bold], and run one of them:
 
     [bold]overlapper run franka_grasp --html grasp.html[/bold]
 
-    A script of your own is watched as it is:
+    Watch a script of your own, without changes to it:
 
     [bold]overlapper watch --html mine.html my_script.py[/bold]
     """
 
 
 def scenes() -> None:
-    """List the scenes that can be run by name: those of the checkout, and of the folder `scenes` here."""
+    """List the scenes that can be run by name: those of the checkout, and those of the folder `scenes` here."""
     for name, path in scene_paths().items():
         say(f"{name:22}{headline(path)}")
 

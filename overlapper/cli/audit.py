@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 LISTED = 20  # pairs at most
 CAPTION = (
-    "Fraction: of the random configurations, with the bounds that hold it with 95 %. Volume: the largest. Depth: the "
-    "largest, of the deepest two shapes."
+    "Fraction: share of the random configurations, with its 95 % confidence bounds. Volume: the largest. Depth: the "
+    "largest, of the deepest pair of shapes."
 )
 
 
@@ -46,51 +46,52 @@ def audit(
     robot: Annotated[
         Path,
         typer.Argument(
-            metavar="ROBOT|FOLDER", help="A model, .urdf, .sdf, .xml (MJCF), or a folder of assets.", show_default=False
+            metavar="ROBOT|FOLDER",
+            help="Robot model (.urdf, .sdf, .xml of MJCF), or folder of assets.",
+            show_default=False,
         ),
     ],
     *,
-    configurations: Annotated[int, typer.Option(min=1, help="How many are looked at.")] = 100_000,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random ones.")] = 0,
+    configurations: Annotated[int, typer.Option(min=1, help="Number of configurations to sample.")] = 100_000,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random configurations.")] = 0,
     expect: ExpectOption = None,
     least_depth: LeastDepthOption = 0.0,
-    against: Annotated[
-        Path | None, typer.Option(help="An SRDF file, of which the pairs that it disables are checked.")
-    ] = None,
-    srdf: Annotated[Path | None, typer.Option(help="SRDF file to write, for a planner.")] = None,
+    against: Annotated[Path | None, typer.Option(help="SRDF file whose disabled pairs are checked.")] = None,
+    srdf: Annotated[Path | None, typer.Option(help="Write an SRDF file for a motion planner.")] = None,
     exclude: Annotated[
-        Path | None, typer.Option(help="MJCF file to write, .xml, with the same pairs as <exclude>, for MuJoCo.")
+        Path | None, typer.Option(help="Write the same pairs as <exclude> to an MJCF file (.xml) for MuJoCo.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Table of all pairs of links, or assets: .csv, .parquet, .sqlite.")
+        Path | None,
+        typer.Option(help="Write a table of all pairs of links, or of all assets: .csv, .parquet, .sqlite."),
     ] = None,
     html: HtmlOption = None,
     engine: AbstractContextManager[Executor],
     tolerance: ToleranceOption = 1e-3,
     modelled: Modelling,
     units: Annotated[
-        Literal["mm", "cm", "m", "in"], typer.Option(help="Of meshes in a folder that do not say theirs.")
+        Literal["mm", "cm", "m", "in"], typer.Option(help="Unit of length of meshes whose files state none.")
     ] = "m",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
-    """Say which pairs of links of a robot never overlap, sometimes or always, how often, by how much and how deep.
+    """Report which pairs of links of a robot overlap never, sometimes or always: how often, how much and how deep.
 
-    Its joints are placed at rest, at corners of their limits, and at random between them. Links that a joint ties, or
-    joints and links without shapes alone, are adjacent: they overlap by design, and are left to themselves. The exit
-    code is 1 if a pair that is not adjacent overlaps always, if a pair that --against disables overlaps, or if a shape
-    is not modelled. It is 2 if the robot cannot be read, else 0.
+    The command samples configurations of the joints: the rest pose, corners of the joint limits, and random ones. Two
+    links are adjacent if a joint connects them, or joints and links without shapes. Adjacent links overlap by design,
+    and are not reported. The exit code is 1 if a pair that is not adjacent always overlaps, if a pair that --against
+    disables overlaps, or if a shape is not modelled. It is 2 if the robot cannot be read, else 0.
 
-    For a folder of models and meshes the answer is what loads, what is closed, and what is left out and why. It says,
-    too, how much volume convex parts add, and what overlaps in itself at rest. The exit code is 1 if anything is to be
-    told.
+    For a folder of models and meshes, the command reports which files load, which meshes are closed, and what is left
+    out and why. It also reports how much volume convex parts add, and which models overlap with themselves at rest.
+    The exit code is 1 if anything is reported.
 
     Examples:
 
     [bold]overlapper audit robot.urdf[/bold]
 
-    [bold]overlapper audit robot.urdf --srdf robot.srdf --out pairs.csv --html worst.html[/bold]  files of it
+    [bold]overlapper audit robot.urdf --srdf robot.srdf --out pairs.csv --html worst.html[/bold]  with three files
 
-    [bold]overlapper audit robot.urdf --against robot.srdf --expect "*finger,*finger"[/bold]  what CI asks
+    [bold]overlapper audit robot.urdf --against robot.srdf --expect "*finger,*finger"[/bold]  a test for CI
 
     [bold]overlapper audit assets --units mm[/bold]  a folder of models and meshes
     """
@@ -109,7 +110,7 @@ def audit(
     if robot.is_dir():
         asked = {"--expect": expect, "--against": against, "--srdf": srdf, "--exclude": exclude, "--html": html}
         if of_robots := [name for name, value in asked.items() if value]:
-            raise Refused(f"{of_robots[0]} is for a robot, and {robot} is a folder")
+            raise Refused(f"{of_robots[0]} needs a robot, but {robot} is a folder")
         audit_folder(robot, units, least_depth, modelled, out, as_json)
     written: list[Path] = []
     with input_refusals(), quiet():
@@ -141,7 +142,7 @@ def audit(
                 lambda blocks, count: with_progress(blocks, robot.name, count),
             )
         if not found.pairs:
-            left_out = "".join(f"; {name} is not modelled: {why}" for name, why in not_modelled(read).items())
+            left_out = "".join(f"; {name} is not modelled, because {why}" for name, why in not_modelled(read).items())
             raise Refused(f"{robot} has no two links with shapes that could overlap{left_out}")
         page = addresses(found, html) if html else {}
         if out:

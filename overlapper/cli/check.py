@@ -20,31 +20,31 @@ from overlapper.scenes.scene import SceneError, scenes_in
 
 def check(
     paths: Annotated[
-        list[Path] | None, typer.Argument(help="Folders of scenes, or scene files; by default `scenes`.")
+        list[Path] | None, typer.Argument(help="Folders of scenes, or scene files. Default: the folder `scenes`.")
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for the pages of scenes that have moved.")] = Path("out"),
-    record: Annotated[bool, typer.Option("--record", help="Write what is expected anew instead.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for the pages of scenes that have changed.")] = Path("out"),
+    record: Annotated[bool, typer.Option("--record", help="Write new expected files instead of comparing.")] = False,
     workers: Annotated[
         int | None,
         typer.Option(
             min=1,
-            help="Scenes at a time; by default one on each core. With 1, they are run in this process.",
+            help="Number of scenes at a time. Default: one on each core. 1: in this process.",
             show_default=False,
         ),
     ] = None,
 ) -> None:
-    """Run scenes and compare them with what was recorded of them in the folder `expected` beside each.
+    """Run scenes and compare them with their expected files, in the folder `expected` beside each scene.
 
-    What moved is told by cause: the geometry is this package's, the shapes are the models', the dynamics the
-    simulator's. A new scene is recorded, and has moved this once. The exit code is 0 if all is as recorded, 1 if
-    something moved, and 2 if a scene could not be run. Shapes that are not modelled are noted. A scene that has
-    diverged is not recorded.
+    Changes are reported by cause: geometry (this package), shapes (the models), or dynamics (the simulator). A scene
+    without an expected file is recorded, and counts as changed once. A scene that diverges is not recorded. Shapes that
+    are not modelled are named. The exit code is 0 if nothing changed, 1 if something changed, and 2 if a scene could
+    not be run.
 
     Examples:
 
-    [bold]overlapper check scenes[/bold]  says what moved, and writes out/<scene>.moved.html with before and after
+    [bold]overlapper check scenes[/bold]  reports changes, and writes out/<scene>.moved.html with before and after
 
-    [bold]overlapper check scenes/grasp.py --record[/bold]  takes what happens today as what is expected
+    [bold]overlapper check scenes/grasp.py --record[/bold]  makes the results of today the expected ones
     """
     named: dict[str, Path] = {}
     for scene in (scene for folder in paths or [Path("scenes")] for scene in _scenes_in(folder)):
@@ -139,14 +139,14 @@ def _refused(sentence: str) -> _Held:
 
 
 def diff(
-    before: Annotated[Path, typer.Argument(help="A table, .csv, .parquet or .sqlite.", show_default=False)],
+    before: Annotated[Path, typer.Argument(help="Table: .csv, .parquet or .sqlite.", show_default=False)],
     after: Annotated[Path, typer.Argument(help="Another table of the same scene.", show_default=False)],
 ) -> None:
-    """Say what moved from one table of overlaps to another: poses of shapes, and overlaps of pairs.
+    """Report changes from one table of overlaps to another: poses of shapes, and overlaps of pairs.
 
-    The budgets are those that the first table has in its heading, as expected files do. Without any, overlaps may
-    differ by rounding, and poses by a tenth of a millimetre and a milliradian. What is not modelled must be the same.
-    The exit code is 0 if nothing moved, 1 if something did, and 2 if a table cannot be read.
+    The budgets, which are the allowed changes, come from the heading of the first table, as in expected files. Without
+    budgets, overlaps may differ by rounding, and poses by 0.1 mm and 1 mrad. Shapes that are not modelled must be the
+    same. The exit code is 0 if nothing changed, 1 if something changed, and 2 if a table cannot be read.
 
     [bold]overlapper diff monday.csv tuesday.csv[/bold]
     """

@@ -30,44 +30,47 @@ if TYPE_CHECKING:
 IN_MATRIX = 12  # bodies at most, so that a terminal holds it
 LISTED = 20  # pairs at most
 CAPTION = (
-    "Volume: of the meshes, true to within ±; of their convex parts where marked with *. Depth: the shortest way to "
-    "part the deepest two of these parts. Convex parts: how many stand for a mesh, and how much more volume they have."
+    "Volume: that of the meshes, with error bound ±; marked with *: that of their convex parts. Depth: the shortest "
+    "translation that separates the deepest two convex parts. Convex parts: their number, and their excess volume."
 )
 
 
 def clashes(
     sources: Annotated[
         list[Path],
-        typer.Argument(metavar="FOLDER|FILE...", help="Meshes, or one assembly.", show_default=False),
+        typer.Argument(
+            metavar="FOLDER|FILE...", help="Mesh files, a folder of them, or one assembly file.", show_default=False
+        ),
     ],
     units: Annotated[
-        Literal["mm", "cm", "m", "in"], typer.Option(help="Of files that do not say theirs, as STL, OBJ and PLY.")
+        Literal["mm", "cm", "m", "in"],
+        typer.Option(help="Unit of length of files that state none, such as STL, OBJ and PLY."),
     ] = "m",
     least_depth: LeastDepthOption = 0.0,
     expect: ExpectOption = None,
     concave: Annotated[
         Literal["decompose", "enclose"],
-        typer.Option(help="Concave meshes as convex parts; open ones, too, with walls around them."),
+        typer.Option(help="Make convex parts of concave meshes. `enclose` also closes open meshes first."),
     ] = "decompose",
     concave_threshold: ThresholdOption = 0.05,
     out: Annotated[
-        Path | None, typer.Option(help="Table of what parts share in all pairs: .csv, .parquet, .sqlite.")
+        Path | None, typer.Option(help="Write a table of all pairs of convex parts: .csv, .parquet, .sqlite.")
     ] = None,
     html: HtmlOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
-    """Say which bodies of mesh files overlap, by how much, and how deep: for CI, and for whoever built them.
+    """Report which bodies of mesh files overlap, by how much, and how deep.
 
-    A folder or several files are a body each, an assembly (glTF, 3MF, STEP) as many as it shows. Volumes are those of
-    the meshes themselves, concave or not, if they are closed. Depths are those of convex parts, of which CoACD makes a
-    concave mesh: by how much more volume these have than the mesh is said beside every answer. The exit code is 0
-    without a clash, 1 with one, and 2 if a mesh could not be read or measured.
+    Each mesh file is one body. An assembly (glTF, 3MF, STEP) has one body for each part that it shows. Volumes are
+    those of the meshes, concave or not, if the meshes are closed. Depths are those of convex parts, which CoACD makes
+    of concave meshes. The excess volume of the parts stands beside every result. The exit code is 0 without a clash,
+    1 with a clash, and 2 if a mesh could not be read or measured.
 
     Examples:
 
-    [bold]overlapper clashes parts --units mm --html clashes.html[/bold]  all pairs of a folder, and a page of them
+    [bold]overlapper clashes parts --units mm --html clashes.html[/bold]  all pairs of a folder, and a page
 
-    [bold]overlapper clashes gearbox.step --expect "bolt*,plate" --least-depth 1e-5[/bold]  what CI asks of an assembly
+    [bold]overlapper clashes gearbox.step --expect "bolt*,plate" --least-depth 1e-5[/bold]  a test of an assembly
     """
     refuse_threshold(concave_threshold)
     refuse_table(out)

@@ -14,15 +14,16 @@ if TYPE_CHECKING:
     from overlapper.jobs.executor import Executor
 
 EngineOption = Annotated[
-    Literal["processes", "ray"], typer.Option(help="Who does it: processes of this machine, or a Ray cluster.")
+    Literal["processes", "ray"],
+    typer.Option(help="Where tasks run: in processes of this machine, or on a Ray cluster."),
 ]
 
 AddressOption = Annotated[
-    str | None, typer.Option(help="Of the Ray cluster, host:port or auto; by default one of this machine.")
+    str | None, typer.Option(help="Address of the Ray cluster: host:port or auto. Default: a cluster on this machine.")
 ]
 
 WorkersOption = Annotated[
-    int | None, typer.Option(min=1, help="Tasks at a time; by default one on each core.", show_default=False)
+    int | None, typer.Option(min=1, help="Number of tasks at a time. Default: one on each core.", show_default=False)
 ]
 
 
@@ -31,7 +32,7 @@ def working(
 ) -> AbstractContextManager[Executor]:
     """The executor, for a block. To enter raises NotStarted if there is no cluster, ImportError without Ray."""
     if address and engine != "ray":
-        raise Refused("--address is for --engine ray")
+        raise Refused("--address needs --engine ray")
     return _engine(engine, address, workers)
 
 

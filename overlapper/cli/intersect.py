@@ -24,24 +24,27 @@ UNITS = {"volume": " m³", "area": " m²", "centroid": " m", "depth": " m", "dis
 def intersect(
     sources: Annotated[
         list[str],
-        typer.Argument(metavar="FILE_OR_URL...", help="Mesh files, and databases of polytopes.", show_default=False),
+        typer.Argument(
+            metavar="FILE_OR_URL...", help="Mesh files, and URLs of databases of polytopes.", show_default=False
+        ),
     ],
     query: Annotated[
-        str | None, typer.Option(help="SQL that returns id, x, y, z, one row per point, ordered by id.")
+        str | None, typer.Option(help="SQL query that returns id, x, y, z: one row per point, ordered by id.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Mesh of what is common: .obj, .stl, .ply.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write a mesh of the common part: .obj, .stl, .ply.")] = None,
     method: MethodOption = "auto",
     concave: Annotated[
-        bool, typer.Option("--concave", help="Two meshes with their dents and holes, and not their hulls.")
+        bool,
+        typer.Option("--concave", help="Take two meshes as they are, concave or not. Default: their convex hulls."),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the lines.")] = False,
 ) -> None:
-    """Measure what convex polytopes have in common, all of them together, without a simulator.
+    """Measure the common part of two or more convex polytopes, without a simulator.
 
-    A mesh file gives the convex hull of its points; a database, named by its SQLAlchemy URL, every polytope that
-    --query returns, or that overlapper.write_polytopes has put there. Lengths are taken for m. With --concave, volumes
-    are those of closed meshes themselves. Depth, centroid and the mesh of --out are those of the convex parts that
-    CoACD makes of a concave mesh. How much more volume these have is said, too.
+    A mesh file gives the convex hull of its points. A database, named by its SQLAlchemy URL, gives the polytopes that
+    --query returns, or those that overlapper.write_polytopes stored. Lengths are read as metres. With --concave,
+    volumes are those of the closed meshes. Depth, centroid and the mesh of --out are then those of the convex parts
+    that CoACD makes of a concave mesh. The excess volume of the parts is printed, too.
 
     Examples:
 
@@ -102,9 +105,9 @@ def _hulls(source: str, query: str | None) -> Iterator[Hull]:
 def _of_meshes(sources: Sequence[str], method: str) -> tuple[dict[str, Any], list[Overlap]]:
     """The overlap of two mesh files, concave or not, and the overlaps of the pairs of their convex parts."""
     if method != "auto":
-        raise Refused("--concave and --method paper do not go together: that method is for polytopes")
+        raise Refused("--concave and --method paper exclude each other: the method `paper` is for polytopes")
     if len(sources) != 2 or any("://" in source for source in sources):
-        raise Refused("--concave is of two mesh files; overlapper clashes takes all pairs of more")
+        raise Refused("--concave takes two mesh files; overlapper clashes takes more, and measures all pairs")
     import numpy as np
 
     from overlapper.audit.clashes import clashes

@@ -19,51 +19,62 @@ SceneArgument = Annotated[
     str, typer.Argument(help="Name of a scene, or path of a scene file (.py).", show_default=False)
 ]
 
-OutOption = Annotated[Path | None, typer.Option(help="Table of all pairs in all steps: .csv, .parquet, .sqlite.")]
-
-HtmlOption = Annotated[Path | None, typer.Option(help="Recording to look at in a browser, one file.")]
-
-CheckOption = Annotated[
-    Literal["fcl"] | None, typer.Option(help="Ask FCL about every pair, too, and explain what differs.")
+OutOption = Annotated[
+    Path | None, typer.Option(help="Write a table of all pairs in all steps: .csv, .parquet, .sqlite.")
 ]
 
-ToleranceOption = Annotated[float, typer.Option(help="Relative accuracy of smooth shapes; polyhedra are exact.")]
+HtmlOption = Annotated[Path | None, typer.Option(help="Write a recording as one HTML file, to open in a browser.")]
+
+CheckOption = Annotated[
+    Literal["fcl"] | None, typer.Option(help="Compare every pair with FCL, and explain differences.")
+]
+
+ToleranceOption = Annotated[
+    float, typer.Option(help="Allowed relative error of the volume of curved shapes. Polyhedra are exact.")
+]
 
 PerOption = Annotated[
-    Literal["shape", "link"], typer.Option(help="What the rows of --out are of: two shapes, or two links as a whole.")
+    Literal["shape", "link"], typer.Option(help="A row of --out is a pair of shapes, or a pair of whole links.")
 ]
 
 MethodOption = Annotated[
-    Literal["auto", "paper"], typer.Option(help="How overlaps are computed; `paper` is the article, step for step.")
+    Literal["auto", "paper"],
+    typer.Option(help="Method of computation. `paper` follows the published article step by step."),
 ]
 
 SurfaceOption = Annotated[
     Literal["nominal", "margin"],
-    typer.Option(help="Convex meshes as they are, or with the margin that Bullet lays around them."),
+    typer.Option(help="Convex meshes as they are, or with the collision margin of Bullet."),
 ]
 
 ConcaveOption = Annotated[
     Literal["decompose", "enclose", "skip"],
-    typer.Option(help="Concave meshes: as convex parts, open ones too with walls around them, or not at all."),
+    typer.Option(help="Concave meshes: make convex parts, close open meshes first (`enclose`), or skip them."),
 ]
 
 ThresholdOption = Annotated[
-    float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
+    float, typer.Option(help="Allowed concavity of convex parts, from 0.01 (many parts) to 1 (the convex hull).")
 ]
 
 PairsOption = Annotated[
     Literal["simulated", "all"] | None,
-    typer.Option(help="Pairs that the simulator lets collide, or all of different bodies; by default PAIRS."),
+    typer.Option(
+        help="Pairs that the simulator lets collide, or all pairs of different bodies. Default: PAIRS of the scene."
+    ),
 ]
 
 ContactOption = Annotated[
     ContactModel | None,
-    typer.Option(help="What pushes bodies apart: contact points, or the volumes they share; by default CONTACT."),
+    typer.Option(
+        help="Contact model: contact points of the engine, or volumetric contact. Default: CONTACT of the scene."
+    ),
 ]
 
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the scene; may be repeated.", show_default=False),
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="Set a parameter of the scene. May be repeated.", show_default=False
+    ),
 ]
 
 
@@ -75,7 +86,7 @@ def given_parameters(settings: Sequence[str] | None) -> dict[str, str]:
         if not (name and sign):
             raise Refused(f"--set must be NAME=VALUE, not {each!r}")
         if name in given:
-            raise Refused(f"--set says {name} twice")
+            raise Refused(f"--set gives {name} twice")
         given[name] = text
     return given
 
@@ -95,7 +106,7 @@ class Simulated:
 def simulated(
     given: SetOption = None,
     steps: Annotated[
-        int | None, typer.Option(min=1, help="Steps to simulate; by default as many as the scene says.")
+        int | None, typer.Option(min=1, help="Number of steps to simulate. Default: STEPS of the scene.")
     ] = None,
     contact: ContactOption = None,
 ) -> Simulated:
@@ -104,12 +115,14 @@ def simulated(
 
 
 LeastDepthOption = Annotated[
-    float, typer.Option(min=0.0, help="Depth in m below which an overlap is none to worry about.", show_default=False)
+    float, typer.Option(min=0.0, help="Ignore overlaps with a depth below this, in m.", show_default=False)
 ]
 
 ExpectOption = Annotated[
     list[str] | None,
-    typer.Option(metavar="A,B", help="Two that may overlap; * is any text; may be repeated.", show_default=False),
+    typer.Option(
+        metavar="A,B", help="Names of two that may overlap. * matches any text. May be repeated.", show_default=False
+    ),
 ]
 
 

@@ -41,34 +41,35 @@ def run(
     modelled: Modelling,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
-    """Simulate a scene and measure what its bodies have in common in every step.
+    """Simulate a scene and measure the overlaps of its bodies in every step.
 
-    A scene is a Python file with STEPS, the number of steps, and build(client), which fills a pybullet client. It may
-    return a function step(i), which is called before each step. PAIRS in it may be "all", or a list of pairs of bodies.
-    With CONTACT "volumetric", bodies are pushed apart by the volumes that they share, and tables have the forces. What
-    build takes beside the client, as build(client, *, mass=1.0, seed=0), are parameters that --set sets.
+    A scene is a Python file with STEPS, the number of steps, and build(client), which fills a pybullet client.
+    build(client) may return a function step(i), which is called before each step. PAIRS in the file may be "all", or a
+    list of pairs of bodies. With CONTACT = "volumetric", contact forces are computed from overlap volumes, and tables
+    have the forces. Further arguments of build, as in build(client, *, mass=1.0, seed=0), are parameters, which --set
+    sets.
 
-    The exit code is 0, 1 if shapes were not modelled or a body has diverged, and 2 if the scene cannot be run.
+    The exit code is 1 if shapes were not modelled or a body has diverged, 2 if the scene cannot be run, else 0.
 
     Examples:
 
     [bold]overlapper run franka_grasp[/bold]  a table of the overlaps
 
-    [bold]overlapper run box_pile --steps 120 --out pile.csv[/bold]  and every pair of every step
+    [bold]overlapper run box_pile --steps 120 --out pile.csv[/bold]  with a table of every pair in every step
 
-    [bold]overlapper run my_scene.py --html my_scene.html[/bold]  and a recording with a time slider
+    [bold]overlapper run my_scene.py --html my_scene.html[/bold]  with a recording to play in a browser
 
     [bold]overlapper run franka_grasp --set mass=0.3 --set friction=0.4[/bold]  with other parameters
 
-    [bold]overlapper run peg_in_hole --contact volumetric --out peg.csv[/bold]  with forces, in the table, too
+    [bold]overlapper run peg_in_hole --contact volumetric --out peg.csv[/bold]  with contact forces in the table
 
-    [bold]overlapper run kuka_jenga --check fcl --json[/bold]  compared with FCL, for a program to read
+    [bold]overlapper run kuka_jenga --check fcl --json[/bold]  compared with FCL, as JSON
     """
     written: list[Path] = []
     try:
         chosen, summary, finished = _measure(scene, simulated, files, asked, modelled, written)
     except Refused as refused:
-        kept = f"; what came before is in {' and '.join(map(str, written))}" if written else ""
+        kept = f"; the steps before are in {' and '.join(map(str, written))}" if written else ""
         raise Refused(f"{refused}{kept}") from refused
     if as_json:
         places = {name: str(path) for name, path in (("out", files.out), ("html", files.html)) if path in written}
@@ -140,6 +141,6 @@ def _show(title: str, summary: Summary, finished: bool, written: Sequence[Path])
     for line in remarks(summary):
         say(line)
     if not finished:
-        say(f"Interrupted after step {summary.steps}; what came before is kept.")
+        say(f"Interrupted after step {summary.steps}; the steps before are kept.")
     for path in written:
         say(f"Written: {path}")

@@ -24,19 +24,21 @@ if TYPE_CHECKING:
 @with_options(modelled=modelling)
 def shapes(
     file: Annotated[
-        Path, typer.Argument(help="A model or a scene: .urdf, .sdf, .xml (MJCF), .bullet.", show_default=False)
+        Path, typer.Argument(help="Model or saved scene: .urdf, .sdf, .xml (MJCF), .bullet.", show_default=False)
     ],
     *,
     modelled: Modelling,
     self_collision: Annotated[
-        bool, typer.Option("--self-collision", help="Load it with pybullet's URDF_USE_SELF_COLLISION.")
+        bool, typer.Option("--self-collision", help="Load the model with pybullet's URDF_USE_SELF_COLLISION.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, of every shape, instead.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object with every shape instead of the table.")
+    ] = False,
 ) -> None:
-    """List what is modelled of a file that pybullet loads: shapes by link, sizes, who may collide, what is skipped.
+    """List the shapes of a file that pybullet loads: by link, with sizes, pairs that may collide, and skipped shapes.
 
-    The exit code is 0 if all of it is modelled, 1 if something is skipped, and 2 if pybullet cannot load it, or would
-    take it for something else than it says.
+    The exit code is 0 if every shape is modelled, and 1 if a shape is skipped. It is 2 if pybullet cannot load the
+    file, or would load something else than the file describes.
 
     Examples:
 
@@ -64,7 +66,7 @@ def shapes(
 def _table(found: Inventory) -> Table:
     """The links that have shapes."""
     table = plain_table(
-        caption="Sizes in m. Volume: of each shape by itself, added up. Meets: how many other links in the file "
+        caption="Sizes in m. Volume: sum of the volumes of the shapes. Meets: number of other links in the file that "
         "pybullet lets the link collide with.",
     )
     table.add_column("link", overflow="fold")

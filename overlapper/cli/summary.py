@@ -25,10 +25,9 @@ def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
     name = escape(printable(title or summary.scene))
     table = plain_table(
         title=f"Overlaps of {name} in {summary.steps} steps, {summary.seconds:.3g} s",
-        caption="Volume: the largest in any step, true to within ±. Depth: the shortest way to part the two, or the "
-        "deepest of their shapes, in the step where that is longest. Normal: that way, for the first of them."
-        + " Force: the largest between the two." * summary.forces
-        + left_out,
+        caption="Volume: the largest in any step, with error bound ±. Depth: the shortest translation that separates "
+        "the two, or the deepest two of their shapes, in the step where it is largest. Normal: the direction of that "
+        "translation, for the first of the two." + " Force: the largest between the two." * summary.forces + left_out,
     )
     # Two lines a pair and narrow numbers, so that a terminal of 80 columns holds the table.
     table.add_column("pair of links", overflow="fold")
@@ -61,7 +60,7 @@ def remarks(summary: Summary, limit: int = 10) -> list[str]:
         lines.append(f"  step {each.step}, {' – '.join(each.names)}, {each.verdict}: {each.explanation}")
     if len(summary.disagreements) > limit:
         rest = len(summary.disagreements) - limit
-        lines.append(f"  and {rest:,} more, each explained in the file of --out and by --json.")
+        lines.append(f"  and {rest:,} more, each explained in the table of --out and in the output of --json.")
     return lines
 
 

@@ -56,30 +56,35 @@ def axes(
         list[str] | None,
         typer.Option(
             metavar="NAME=FROM:TO:COUNT[:log]|NAME=A,B,...",
-            help="Values of a parameter; may be repeated.",
+            help="Values of a parameter. May be repeated.",
             show_default=False,
         ),
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(min=1, help="So many seeds, from 0 on, for the parameter `seed`.", show_default=False)
+        int | None,
+        typer.Option(min=1, help="Number of seeds. The parameter `seed` gets 0, 1, 2, ...", show_default=False),
     ] = None,
     points: Annotated[
-        Path | None, typer.Option(help="A CSV table with a column for each parameter.", show_default=False)
+        Path | None, typer.Option(help="CSV table of points, with a column for each parameter.", show_default=False)
     ] = None,
     sample: Annotated[
-        int | None, typer.Option(min=1, help="So many points of a Latin hypercube of the ranges.", show_default=False)
+        int | None,
+        typer.Option(min=1, help="Number of points of a Latin hypercube sample of the ranges.", show_default=False),
     ] = None,
     ranges: Annotated[
         list[str] | None,
         typer.Option(
-            "--range", metavar="NAME=FROM:TO[:log]", help="What --sample draws; may be repeated.", show_default=False
+            "--range",
+            metavar="NAME=FROM:TO[:log]",
+            help="Range of a parameter for --sample. May be repeated.",
+            show_default=False,
         ),
     ] = None,
-    sample_seed: Annotated[int, typer.Option(min=0, help="Another one draws other points.")] = 0,
+    sample_seed: Annotated[int, typer.Option(min=0, help="Seed of --sample.")] = 0,
 ) -> Axes:
     """The axes whose product is the points of a sweep."""
     if ranges and not sample:
-        raise Refused("--range says what --sample draws, and there is no --sample")
+        raise Refused("--range needs --sample")
     return Axes(grid, seeds, points, sample, ranges, sample_seed)
 
 
@@ -87,42 +92,48 @@ def axes(
 def sweep(
     scene: SceneArgument,
     out: Annotated[
-        Path, typer.Option(help="Folder of the sweep; what is there is not done again.", show_default=False)
+        Path, typer.Option(help="Folder of the sweep. Tasks that it has are not run again.", show_default=False)
     ],
     *,
     axes: Axes,
     simulated: Simulated,
     steps_kept: Annotated[
-        str, typer.Option(metavar='summary|"every N"|all', help="Steps of which all pairs are kept, too.")
+        str,
+        typer.Option(
+            metavar='summary|"every N"|all', help="Steps whose pairs are kept in tables, besides the summary."
+        ),
     ] = "summary",
     limit: Annotated[
-        float | None, typer.Option(min=0.001, help="Seconds that a task may take; then it has failed.")
+        float | None, typer.Option(min=0.001, help="Time limit of a task, in s. A task that exceeds it fails.")
     ] = None,
     memory: Annotated[
         int | None,
-        typer.Option(min=1, help="Megabytes that a task may take, on Linux; then it has failed."),
+        typer.Option(min=1, help="Memory limit of a task, in MB, on Linux. A task that exceeds it fails."),
     ] = None,
-    retry: Annotated[bool, typer.Option("--retry", help="Do tasks again that have failed.")] = False,
+    retry: Annotated[bool, typer.Option("--retry", help="Run failed tasks again.")] = False,
     engine: AbstractContextManager[Executor],
     check: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="A recorded sweep: say what has moved since.", show_default=False),
+        typer.Option(metavar="FOLDER", help="Folder of a recorded sweep to compare with.", show_default=False),
     ] = None,
-    pages: Annotated[int, typer.Option(min=0, help="Pages of so many of the worst tasks, beside the summary.")] = 0,
+    pages: Annotated[
+        int, typer.Option(min=0, help="Number of tasks, the worst first, that get a page of their own.")
+    ] = 0,
     asked: Asking,
     modelled: Modelling,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the text.")] = False,
 ) -> None:
-    """Run a scene with many parameters, and keep what each run came to.
+    """Run a scene with many values of its parameters, and keep a summary of each run.
 
-    The parameters of a scene are what its build takes beside the client, as build(client, *, mass=1.0, seed=0). What
-    --grid, --seeds, --points and --sample give is crossed; --set holds for all. A task is a row of OUT/tasks.parquet,
-    and one that failed a row of OUT/failures.parquet. Started again, a sweep does what is missing. The exit code is 0
-    if all tasks are done, 1 if any has failed, diverged or left shapes out, and 2 if none could be run.
+    The parameters of a scene are the further arguments of its build, as in build(client, *, mass=1.0, seed=0). A task
+    is a run with one value of each parameter. The tasks are all combinations of --grid, --seeds, --points and --sample.
+    --set holds for all tasks. Each task is a row of OUT/tasks.parquet, or of OUT/failures.parquet if it failed. A sweep
+    that is started again runs only the missing tasks. The exit code is 0 if all tasks are done, 1 if any task failed,
+    diverged or left shapes out, and 2 if no task could be run.
 
-    With --check, the tasks are compared with those of the same parameters in another folder, by the budgets of the
-    scene's expected file, or else by rounding. The exit code is 0 if nothing moved, 1 if something did, or failed that
-    was not recorded as failed, and 2 if there is nothing to compare.
+    With --check, the tasks are compared with those of the same parameters in another folder. The allowed changes are
+    the budgets of the scene's expected file, or rounding errors. The exit code is 0 if nothing changed, and 1 if a task
+    changed or newly failed. It is 2 if there is nothing to compare.
 
     Examples:
 
@@ -269,7 +280,7 @@ def _tell(
         before = f", {reached.before:,} of them before" if reached.before else ""
         say(f"{todo.study.scene}: {reached.before + reached.done:,} of {reached.total:,} tasks are done{before}.")
         for path in store.broken:
-            say(f"Not as it was written, and so done again: {path}")
+            say(f"A file has changed since it was written, so its tasks run again: {path}")
         for line in left_out.lines():
             say(line)
         for row in failures:
@@ -277,9 +288,9 @@ def _tell(
         if failed > FAILURES_SHOWN:
             say(f"and {failed - FAILURES_SHOWN:,} more")
         if failed:
-            say(f"Tracebacks: {store.path('failures')}; --retry does them again")
+            say(f"Tracebacks: {store.path('failures')}; --retry runs these tasks again")
         if not finished:
-            say("Interrupted; the same command goes on with what is missing.")
+            say("Interrupted; the same command continues with the missing tasks.")
         for line in compared.lines(MOVED_SHOWN) if compared else ():
             say(line)
         for path in filter(None, (store.path("tasks") if page else None, page)):

@@ -36,34 +36,44 @@ class Shown:
 
 
 def shown(
-    html: Annotated[Path | None, typer.Option(help="Write a page for any browser; out/<name>.html by default.")] = None,
-    png: Annotated[Path | None, typer.Option(help="Draw a picture instead, without a browser.")] = None,
-    live: Annotated[bool, typer.Option("--live", help="Watch it in meshcat while it is simulated instead.")] = False,
+    html: Annotated[Path | None, typer.Option(help="Write a page for a browser. Default: out/<name>.html.")] = None,
+    png: Annotated[Path | None, typer.Option(help="Write a picture instead of a page.")] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show the scene in meshcat during the simulation, instead of a page.")
+    ] = False,
     host: Annotated[
-        str, typer.Option(help="Address of this machine at which --live is seen; 0.0.0.0 shows it to the network.")
+        str, typer.Option(help="Address of this machine for --live. 0.0.0.0 shows it to the network.")
     ] = "127.0.0.1",
     step: Annotated[
-        int | None, typer.Option(min=1, help="Of the picture; by default the one in which most is shared.")
+        int | None, typer.Option(min=1, help="Step of the picture. Default: the step with the largest overlap.")
     ] = None,
-    close: Annotated[bool, typer.Option("--close", help="The picture is of the largest overlap.")] = False,
+    close: Annotated[bool, typer.Option("--close", help="Zoom the picture to the largest overlap.")] = False,
 ) -> Shown:
     """The page, picture or live view that is asked for."""
     if sum(map(bool, (html, png, live))) > 1:
-        raise Refused("--html, --png and --live do not go together: one at a time")
+        raise Refused("--html, --png and --live exclude each other")
     return Shown(html, png, live, host, step, close)
 
 
 def looks(
     overlaps: Annotated[
-        str, typer.Option(help="What is drawn of overlaps: faces, edges, vertices, marks, forces.")
+        str, typer.Option(help="Parts of overlaps to draw: faces, edges, vertices, marks, forces.")
     ] = "faces,marks,forces",
-    overlaps_opacity: Annotated[float, typer.Option(help="From 0 to 1.")] = 1.0,
-    overlaps_front: Annotated[str | None, typer.Option(help="Colour from outside; the owners' if not given.")] = None,
-    overlaps_back: Annotated[str | None, typer.Option(help="Colour from inside, seen if opacity is below 1.")] = None,
-    bodies: Annotated[str, typer.Option(help="What is drawn of bodies: faces, edges, vertices.")] = "faces,edges",
-    bodies_opacity: Annotated[float, typer.Option(help="From 0 to 1.")] = 0.35,
-    bodies_front: Annotated[str | None, typer.Option(help="Colour from outside; their own if not given.")] = None,
-    bodies_back: Annotated[str | None, typer.Option(help="Colour from inside; not drawn if not given.")] = None,
+    overlaps_opacity: Annotated[float, typer.Option(help="Opacity of overlaps, from 0 to 1.")] = 1.0,
+    overlaps_front: Annotated[
+        str | None, typer.Option(help="Colour of the outside. Default: the colours of the two bodies.")
+    ] = None,
+    overlaps_back: Annotated[
+        str | None, typer.Option(help="Colour of the inside. It is visible if the opacity is below 1.")
+    ] = None,
+    bodies: Annotated[str, typer.Option(help="Parts of bodies to draw: faces, edges, vertices.")] = "faces,edges",
+    bodies_opacity: Annotated[float, typer.Option(help="Opacity of bodies, from 0 to 1.")] = 0.35,
+    bodies_front: Annotated[
+        str | None, typer.Option(help="Colour of the outside. Default: the body's own colour.")
+    ] = None,
+    bodies_back: Annotated[
+        str | None, typer.Option(help="Colour of the inside. Default: the inside is not drawn.")
+    ] = None,
 ) -> tuple[Look, Look]:
     """The looks of bodies and of overlaps."""
     return (
@@ -74,28 +84,26 @@ def looks(
 
 @with_options(shown=shown, simulated=simulated, looks=looks)
 def view(
-    source: Annotated[
-        str, typer.Argument(help="A scene, by name or path, or a table of one that was written.", show_default=False)
-    ],
+    source: Annotated[str, typer.Argument(help="Scene, by name or path, or table of a scene.", show_default=False)],
     *,
     shown: Shown,
     scene: Annotated[
-        str | None, typer.Option(help="The scene of a table that has no shapes, by name or path: it is run again.")
+        str | None, typer.Option(help="Scene of a table without shapes, by name or path. It is run again.")
     ] = None,
     simulated: Simulated,
     looks: tuple[Look, Look],
 ) -> None:
-    """See a scene, or a table of one: as a page with a time slider, as a picture, or live.
+    """Show a scene, or a table of a scene: as a page with a time slider, as a picture, or live.
 
-    An expected file has all that is needed. Of any other table give the --scene, which is run again with the table's
-    settings, and what is not as in the table is told. No file is run because a table names it. The exit code is 1 if
-    shapes were not modelled or a body has diverged.
+    An expected file contains the shapes and poses. Any other table needs --scene: the scene is run again with the
+    settings of the table, and differences are reported. A file that only the table names is never run. The exit code is
+    1 if shapes were not modelled or a body has diverged.
 
     Examples:
 
     [bold]overlapper view franka_grasp[/bold]  a page to play, click and measure in: out/franka_grasp.html
 
-    [bold]overlapper view franka_grasp --set mass=0.3[/bold]  with a parameter of the scene that is not its default
+    [bold]overlapper view franka_grasp --set mass=0.3[/bold]  with another value of a parameter
 
     [bold]overlapper view scenes/expected/box_pile.csv --png pile.png --close[/bold]  a picture for a report
 
@@ -152,7 +160,7 @@ def _film(playback: Playback, html: Path, looks: Sequence[Look], written: list[P
                 raise
             return False
     if not seen:
-        raise ValueError("there is nothing to see: no step was simulated or recorded")
+        raise ValueError("there is nothing to show: no step was simulated or recorded")
     return True
 
 

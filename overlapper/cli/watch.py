@@ -35,41 +35,42 @@ if TYPE_CHECKING:
 def watch(
     script: Annotated[
         Path,
-        typer.Argument(help="A Python script that steps pybullet or MuJoCo.", show_default=False, metavar="SCRIPT.py"),
+        typer.Argument(help="Python script that steps pybullet or MuJoCo.", show_default=False, metavar="SCRIPT.py"),
     ],
     context: typer.Context,
     arguments: Annotated[
         list[str] | None, typer.Argument(help="Arguments of the script.", show_default=False, metavar="[ARGS]...")
     ] = None,
     *,
-    every: Annotated[int, typer.Option(min=1, help="Steps from one that is measured to the next.")] = 1,
+    every: Annotated[int, typer.Option(min=1, help="Measure one step in this many.")] = 1,
     names: Annotated[
         list[str] | None,
-        typer.Option("--name", metavar="BODY=NAME", help="A name for a body by its number; may be repeated."),
+        typer.Option("--name", metavar="BODY=NAME", help="Name of a body, by its number. May be repeated."),
     ] = None,
     files: Written,
     asked: Asking,
     modelled: Modelling,
     direct: Annotated[
-        bool, typer.Option("--direct", help="Give the script no window if it asks for one: pybullet.DIRECT for GUI.")
+        bool,
+        typer.Option("--direct", help="Replace pybullet.GUI by pybullet.DIRECT, so that the script opens no window."),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Say one JSON object instead of the table.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> Callable[[], int]:
-    """Run a script of pybullet or MuJoCo as it is, and measure what its bodies share whenever it makes a step.
+    """Run an unchanged script of pybullet or MuJoCo, and measure the overlaps of its bodies in every step.
 
-    Options of the watch stand before the script, those of the script behind it. Its output, its arguments, its exit
-    code and Ctrl-C are as without the watch, whose own words go to stderr when the script has ended. Each pybullet
-    client and each MjData that the script steps has a table of its own: the second is in FILE-2. The exit code is 2
-    where the script's would be 0 and something was not measured or written: nothing at all, shapes that are not
-    modelled, bodies that have diverged, or steps in other processes.
+    Options of this command stand before the script, options of the script after it. The output, the arguments and the
+    exit code of the script are as without this command, and Ctrl-C works. The tables are printed on stderr when the
+    script has ended. Each pybullet client and each MjData that the script steps has a table of its own: the second is
+    written to FILE-2. The exit code is 2 instead of 0 if something was not measured or written: no step at all, shapes
+    that are not modelled, bodies that have diverged, or steps in other processes.
 
     Examples:
 
     [bold]overlapper watch my_script.py --seed 3[/bold]  a table of the overlaps, on stderr
 
-    [bold]overlapper watch --out run.parquet --html run.html --every 10 my_script.py[/bold]  and files, every tenth step
+    [bold]overlapper watch --out run.parquet --html run.html --every 10 my_script.py[/bold]  every tenth step, in files
 
-    [bold]overlapper watch --name 1=gripper --name 2=cup my_script.py[/bold]  bodies by names of your own
+    [bold]overlapper watch --name 1=gripper --name 2=cup my_script.py[/bold]  with names of your own
 
     [bold]overlapper watch --direct my_script.py[/bold]  a script that opens a window, on a machine without a screen
     """
@@ -109,8 +110,8 @@ def _look_for_windows(script: Path, direct: bool) -> None:
     if direct:
         open_no_window()
         return
-    sentence = f"{script} asks pybullet for a window, and there is no screen to show it on, so pybullet ends it"
-    tell_of_windows(lambda: say(f"overlapper: {sentence}: --direct runs it without one", sys.stderr))
+    sentence = f"{script} opens a window of pybullet, but there is no screen, so pybullet ends the script"
+    tell_of_windows(lambda: say(f"overlapper: {sentence}: --direct runs it without a window", sys.stderr))
 
 
 def _named(given: Sequence[str]) -> dict[int, str]:
@@ -121,7 +122,7 @@ def _named(given: Sequence[str]) -> dict[int, str]:
         if not (number.isascii() and number.isdigit() and name.strip()):
             raise Refused(f"--name must be BODY=NAME, such as 3=duck, not {each!r}")
         if int(number) in names:
-            raise Refused(f"--name says {number} twice")
+            raise Refused(f"--name gives {number} twice")
         names[int(number)] = name
     return names
 
@@ -201,14 +202,14 @@ def _show(watches: Watches, interrupted: bool) -> None:
         for path in watch.written:
             say(f"Written: {path}", sys.stderr)
     if interrupted and watches.all:
-        say(f"Interrupted after step {watches.all[-1].steps}; what came before is kept.", sys.stderr)
+        say(f"Interrupted after step {watches.all[-1].steps}; the steps before are kept.", sys.stderr)
 
 
 def _not_watched(script: Path, watches: Watches, how: Mapping[str, Any], astray: Sequence[str]) -> list[str]:
     """A sentence for all that was asked for and is not in the answer, but for shapes, which the summaries name."""
     told = []
     for watch, error in watches.failed:
-        kept = f"; what came before is in {' and '.join(map(str, watch.written))}" if watch.written else ""
+        kept = f"; the steps before are in {' and '.join(map(str, watch.written))}" if watch.written else ""
         reason = first_line(error)
         if isinstance(error, OSError):
             reason = f"cannot write {error.filename or 'the results'}: {error.strerror or error}"
@@ -219,12 +220,15 @@ def _not_watched(script: Path, watches: Watches, how: Mapping[str, Any], astray:
         told.append(f"{script} stepped simulations in other processes, which are not watched")
     if number := watches.loaded_elsewhere:
         processes = "another process that loads" if number == 1 else f"{number:,} other processes that load"
-        told.append(f"{script} started {processes} pybullet: what is stepped there is not watched")
+        told.append(f"{script} started {processes} pybullet: steps in other processes are not watched")
     for body, name in how["names"].items() if watches.all else ():
         if all(body in watch.unnamed for watch in watches.all):
             told.append(f"--name {body}={name}: there is no body {body}")
     for name in dict.fromkeys(astray):
-        told.append(f"{name} stands behind {script}, and was an argument of it: options of the watch stand before it")
+        told.append(
+            f"{name} stands after {script} and was an argument of the script: "
+            "options of overlapper watch stand before the script"
+        )
     return told
 
 

@@ -102,7 +102,7 @@ class Cluster:
                     except ray.exceptions.RayError as error:
                         losses += 1
                         if losses > LOSSES + done * 2 * crews:
-                            raise NotStarted(f"the cluster loses what it is given: {first_line(error)}") from error
+                            raise NotStarted(f"the Ray cluster loses objects: {first_line(error)}") from error
                         shares.give_back(share)
                         continue
                     losses, done = 0, True

@@ -143,7 +143,7 @@ class Worker:
         self._words.seek(max(self._words.seek(0, os.SEEK_END) - WORDS, 0))
         words = self._words.read().decode(errors="replace")
         if closed:
-            return Ended("closed the pipe of its answers and went on", None, words)
+            return Ended("closed the pipe for its answers, but did not end", None, words)
         how = f"signal {signal_name(-code)}" if code < 0 else f"exit code {code}"
         said = [first_line("".join(groups)) for groups in re.findall(self._cause, words, re.MULTILINE)]
         return Ended(f"ended with {how}" + (f" ({said[-1]})" if said else ""), code, words)

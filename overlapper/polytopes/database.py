@@ -97,7 +97,7 @@ def read_polytopes(
         met = set()
         for id, points in groupby(rows, key=lambda row: row[0]):
             if id in met:
-                raise ValueError(f"the query must return the points of polytope {id} together: ORDER BY its id")
+                raise ValueError(f"the query must return the points of polytope {id} together: add ORDER BY id")
             met.add(id)
             try:
                 hull = Hull([_point(corner, row) for corner, row in enumerate(points)])

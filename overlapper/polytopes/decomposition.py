@@ -20,6 +20,7 @@ import tempfile
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
@@ -83,10 +84,10 @@ class WeldedMesh:
         if corners.ndim != 3 or corners.shape[1:] != (3, 3):
             raise ValueError(f"triangles must have the shape (t, 3, 3), not {corners.shape}")
         if not np.isfinite(corners).all():
-            raise NotDecomposed("the mesh has corners that are not finite")
+            raise NotDecomposed("the mesh has vertices that are not finite")
         vertices, faces = _welded(corners)
         if not len(faces):
-            raise NotDecomposed("the mesh has no triangle that has an area")
+            raise NotDecomposed("the mesh has no triangle with an area")
         volume = None
         if _turns_one_way(faces):
             volume = _volume(vertices, faces)
@@ -115,8 +116,8 @@ def cache_folder() -> Path:
 
 def check_threshold(threshold: float) -> None:
     """ValueError unless CoACD takes this threshold."""
-    if not 0.01 <= threshold <= 1:
-        raise ValueError(f"the threshold of concavity must lie between 0.01 and 1, not {threshold}")
+    if not (isinstance(threshold, Real) and 0.01 <= threshold <= 1):
+        raise ValueError(f"the concavity threshold must lie between 0.01 and 1, not {threshold!r}")
 
 
 def decompose(
@@ -134,9 +135,7 @@ def decompose(
     check_threshold(threshold)
     surface = WeldedMesh.of(triangles)
     if surface.open_edges and not enclose:
-        raise NotDecomposed(
-            f"the concave mesh bounds no volume: its surface is open along {surface.open_edges:,} edges"
-        )
+        raise NotDecomposed(f"the concave mesh bounds no volume: its surface has {surface.open_edges:,} open edges")
     if convex := surface.convex_bodies():
         return Decomposition(tuple(convex), surface.volume, None)
     vertices, faces, volume = surface.vertices, surface.faces, surface.volume
@@ -313,7 +312,7 @@ def _coacd(vertices: Vertices, faces: Faces, threshold: float, time_limit: float
         if ended.limit is not None:
             raise NotDecomposed(f"CoACD did not decompose the concave mesh within {ended.limit:g} s") from None
         if ended.code == 0:
-            raise NotDecomposed("CoACD's process was cut off in the middle of its answer") from None
+            raise NotDecomposed("CoACD's process ended before its answer was complete") from None
         raise NotDecomposed(f"CoACD failed on the concave mesh: its process {ended}") from None
 
 

@@ -97,9 +97,9 @@ def read_hull(path: str | Path) -> Hull:
     """
     hull, closed, share = _parsed(path, "is not a mesh with a hull", mesh_parser.hull)
     if not closed:
-        warnings.warn(f"{path} is not closed: its convex hull stands for it", NotConvexWarning, stacklevel=2)
+        warnings.warn(f"{path} is not closed: its convex hull is used instead", NotConvexWarning, stacklevel=2)
     elif share < 1 - DENT:
-        what = f"fills {share:.1%} of its convex hull, which stands for it"
+        what = f"fills {share:.1%} of its convex hull, which is used instead"
         warnings.warn(f"{path} is not convex: it {what}", NotConvexWarning, stacklevel=2)
     return hull
 
@@ -128,7 +128,7 @@ def _must_be_a_file(path: Path, wrong: str) -> None:
     if stat.S_ISDIR(kind):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if not stat.S_ISREG(kind):
-        raise ValueError(f"{path} {wrong}: it is a pipe or a device, and no file")
+        raise ValueError(f"{path} {wrong}: it is a pipe or a device, not a file")
     path.open("rb").close()
 
 

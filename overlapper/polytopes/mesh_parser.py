@@ -130,7 +130,7 @@ def _resolver() -> type[Any]:
                 file = (folder / each).resolve()
                 if file.is_file() and file.is_relative_to(folder):
                     return file.read_bytes()
-            raise ValueError(f"it needs {name!r}, and there is no such file beside it")
+            raise ValueError(f"it needs the file {name!r} in the same folder, which does not exist")
 
     return Beside
 
@@ -146,11 +146,11 @@ def _must_fit(path: Path) -> None:
     """ValueError for a file that would take much more time and memory than its size suggests."""
     size, ending = path.stat().st_size, path.suffix.lower()
     if ending in PACKED:
-        raise ValueError("it is packed, and must be unpacked first")
+        raise ValueError("it is compressed: decompress it first")
     if ending in ZIPPED:
         with zipfile.ZipFile(path) as packed:
             if sum(each.file_size for each in packed.infolist()) > MOST_UNPACKED * size:
-                raise ValueError(f"it unpacks to more than {MOST_UNPACKED} times its size")
+                raise ValueError(f"it decompresses to more than {MOST_UNPACKED} times its size")
             if ending == ".3mf":
                 _must_show_few(_shown_by_3mf(packed))
     if ending == ".stl":
@@ -159,7 +159,7 @@ def _must_fit(path: Path) -> None:
         if len(head) >= 84 and b"facet" not in head:  # otherwise the file is text
             (count,) = struct.unpack_from("<I", head, 80)
             if 84 + 50 * count != size:
-                raise ValueError(f"it counts {count:,} triangles, and has room for {(size - 84) // 50:,}")
+                raise ValueError(f"it states {count:,} triangles, but has room for {(size - 84) // 50:,}")
     if ending in (".glb", ".gltf"):
         _must_be_there(path, _gltf(path), size)
 
@@ -180,7 +180,7 @@ def _chunks(data: bytes) -> Iterator[tuple[int, int]]:
         (length,) = struct.unpack_from("<I", data, end)
         begin, end = end + 8, end + 8 + length
         if end > len(data):
-            raise ValueError(f"it has a chunk of {length:,} bytes, and room for {len(data) - begin:,}")
+            raise ValueError(f"it has a chunk of {length:,} bytes, but room for {len(data) - begin:,}")
         yield begin, end
 
 
@@ -191,7 +191,7 @@ def _must_be_there(path: Path, scene: Any, size: int) -> None:
     size += sum(file.stat().st_size for file in beside if file.is_file())
     counts = [int(each["count"]) for each in scene.get("accessors", ())]
     if max(counts, default=0) > size:
-        raise ValueError(f"it counts {max(counts):,} numbers in {size:,} bytes")
+        raise ValueError(f"it states {max(counts):,} numbers, but has {size:,} bytes")
     meshes = []
     for mesh in scene.get("meshes", ()):
         used = [[*each["attributes"].values(), each.get("indices")] for each in mesh["primitives"]]
@@ -224,7 +224,7 @@ def _shown_by_3mf(packed: zipfile.ZipFile) -> int:
     try:
         order = list(TopologicalSorter(made_of).static_order())
     except CycleError as error:
-        raise ValueError("an object in it is made of itself") from error
+        raise ValueError("an object in it contains itself") from error
     for id in order:
         shown[id] = own.get(id, 1) + sum(shown[each] for each in made_of.get(id, ()))
     return sum(shown.get(id, 1) for id in items)
@@ -232,4 +232,4 @@ def _shown_by_3mf(packed: zipfile.ZipFile) -> int:
 
 def _must_show_few(shown: int) -> None:
     if shown > MOST_SHOWN:
-        raise ValueError(f"it shows {shown:,} corners and indices, which is more than {MOST_SHOWN:,}")
+        raise ValueError(f"it has {shown:,} vertices and indices, more than {MOST_SHOWN:,}")

@@ -47,7 +47,7 @@ def random_polytope(n: int, source: Source = "cube", *, rng: np.random.Generator
     if source not in get_args(Source):
         raise ValueError(f"source must be one of {', '.join(get_args(Source))}, not {source!r}")
     if n < 4:
-        raise ValueError(f"n must be at least 4, as fewer points or planes enclose nothing, not {n}")
+        raise ValueError(f"n must be at least 4, because fewer points or planes enclose no volume, not {n}")
     generator = np.random.default_rng(rng)
     if source == "halfspaces":
         return _cell(n, generator)

@@ -39,7 +39,7 @@ def shape_of(text: str) -> Shape:
         kind = {each.__name__: each for each in KINDS}[name]
         shape: Shape = kind(*map(_parameter_of_text, parameters))
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError, zlib.error, binascii.Error) as error:
-        raise ValueError(f"{text[:60]!r} is no shape: {first_line(error)}") from error
+        raise ValueError(f"{text[:60]!r} is not a shape: {first_line(error)}") from error
     return shape
 
 
@@ -54,7 +54,7 @@ def _inflated(data: bytes) -> bytes:
     unpacker = zlib.decompressobj()
     inflated = unpacker.decompress(data, LARGEST)
     if not unpacker.eof:
-        raise ValueError(f"its vertices are cut, or more than {LARGEST // 24:,}")
+        raise ValueError(f"its vertices are cut off, or more than {LARGEST // 24:,}")
     return inflated
 
 

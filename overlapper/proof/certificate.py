@@ -109,7 +109,7 @@ def _nearest(body: RationalBody, shape: Shape, point: Exact) -> Exact:
         return foot
     middle = body.position + body.axes @ exact(shape.centroid)
     if not body.contains(middle[None])[0]:
-        raise CertificateError("a body too thin for its centroid to lie in it has no certificate")
+        raise CertificateError("a body has no certificate if it is so thin that its rounded centroid lies outside")
     shares = np.array([Fraction(1, 2**k) for k in range(128)])
     candidates = middle + (1 - shares)[:, None] * (point - middle)
     nearest: Exact = candidates[np.flatnonzero(body.contains(candidates))[-1]]

@@ -126,7 +126,7 @@ def doubles(points: Iterable[Vector]) -> Floats:
 def pieces(body: RationalBody, home: RationalBody) -> list[Piece]:
     """The pieces of a body in the axes of `home`."""
     if not body.facts.has_blocks:
-        raise CertificateError(f"no volume is proved of {body.facts.name}, which is not made of balls and cylinders")
+        raise CertificateError(f"{body.facts.name} has no certificate, because it is not made of balls and cylinders")
     frame = Frame(body, home)
     try:
         return [frame.piece(block) for block in body.facts.blocks()]

@@ -65,7 +65,7 @@ def hold(path: Path, page: Path, anew: bool = False) -> Outcome:
             page.unlink(missing_ok=True)  # of an earlier run
             if anew:
                 return Outcome(scene.name, "recorded", [written, *notes])
-            look = "look at it, commit it, and the scene is guarded from now on"
+            look = "look at the file and commit it: later runs are compared with it"
             return Outcome(scene.name, "new", [written, *notes, look])
         verdict = examined(scene, read_expected(scene.expected))
     except ValueError as error:
@@ -91,7 +91,7 @@ def record(scene: Scene) -> list[str]:
     for step, still in made.stills.items():
         for each in still.skipped:
             if each.diverged:
-                raise SceneError(f"{scene.path} is not recorded: {each.name} has diverged in step {step}")
+                raise SceneError(f"{scene.path} is not recorded, because {each.name} diverged in step {step}")
     made.write(scene.expected, origin(scene.engine) | heading_of(scene.parameters))
     return left_out(made.stills)
 

@@ -60,7 +60,7 @@ def known(name: str, defaults: Mapping[str, Parameter], scene: str) -> None:
     if name in defaults:
         return
     if not defaults:
-        raise ValueError(f"the scene {scene} has no parameters, and so no {name!r}")
+        raise ValueError(f"the scene {scene} has no parameter {name!r}: it has no parameters")
     nearest = difflib.get_close_matches(name, defaults, n=1)
     hint = f"; the nearest is {nearest[0]!r}" if nearest else ""
     raise ValueError(f"the scene {scene} has no parameter {name!r}{hint} (it has {described(defaults)})")
@@ -76,7 +76,7 @@ def value_of(name: str, text: str, default: Parameter) -> Parameter:
     try:
         return read(text)
     except (ValueError, KeyError):
-        raise ValueError(f"{name} must be {words}, as its default {default} is, not {text!r}") from None
+        raise ValueError(f"{name} must be {words} like its default {default}, not {text!r}") from None
 
 
 def values_of(given: Mapping[str, str], defaults: Mapping[str, Parameter], scene: str) -> dict[str, Parameter]:

@@ -76,13 +76,13 @@ def play(
     path = Path(source)
     if path.suffix not in TABLES:
         if scene is not None:
-            raise ValueError(f"--scene is for tables, and {source} is none")
+            raise ValueError(f"--scene is for tables, but {source} is not a table")
         chosen = load_scene(source, given)
         return Playback(chosen.title, steps or chosen.steps, run(chosen, steps, contact=contact))
     if given:
-        raise ValueError(f"--set is for scenes, and {source} is a table, which says its own parameters")
+        raise ValueError(f"--set is for scenes, but {source} is a table, which has its own parameters")
     if contact:
-        raise ValueError(f"--contact is for scenes, and {source} is a table, which says its own")
+        raise ValueError(f"--contact is for scenes, but {source} is a table, which has its own contact model")
     table = read_content(path)
     if has_shapes(table):
         expected = expected_in(table, path)
@@ -90,12 +90,12 @@ def play(
     if scene is None:
         said = table.metadata.get("scene")
         named = f" (it says {printable(said)!r})" if said else ""
-        raise ValueError(f"{path} has no shapes to show: give the scene that it is of with --scene{named}")
+        raise ValueError(f"{path} has no shapes to show: give its scene with --scene{named}")
     recorded, chosen = table.rows, load_scene(scene, read_heading(table.metadata))
     last = max((int(row["step"] or 0) for row in recorded), default=1)
     playback = Playback(path.stem, min(last, steps or chosen.steps), _nothing())
     if playback.total < last:
-        playback.remarks.append(f"{path} goes on to step {last:,}: --steps {last} shows all of it")
+        playback.remarks.append(f"{path} has {last:,} steps: --steps {last} shows all of them")
         recorded = [row for row in recorded if int(row["step"] or 0) <= playback.total]
     playback.views = playback._noted(_held_against(path, chosen, table.metadata, recorded, playback))
     return playback
@@ -129,7 +129,7 @@ def _held_against(
     moves = compare_measures(recorded, found, HUNDREDTHS).moves
     if moves:
         first = min(moves, key=lambda move: move.step)
-        playback.remarks.append(f"what is seen is not what {path} has, as the simulation has changed: {first}")
+        playback.remarks.append(f"the steps shown differ from {path}, because the simulation has changed: {first}")
 
 
 def largest(views: Iterator[View]) -> Frame[Still]:
@@ -140,7 +140,7 @@ def largest(views: Iterator[View]) -> Frame[Still]:
         if volume > most or volume == 0 == most:
             best, most = view.kept(), volume
     if best is None:
-        raise ValueError("there is nothing to see: no step was simulated or recorded")
+        raise ValueError("there is nothing to show: no step was simulated or recorded")
     return best
 
 
@@ -149,4 +149,4 @@ def at_step(views: Iterator[View], step: int) -> Frame[Still]:
     for view in views:
         if view.step == step:
             return view.kept()
-    raise ValueError(f"there is no step {step} to see")
+    raise ValueError(f"there is no step {step} to show")

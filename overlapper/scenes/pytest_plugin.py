@@ -69,7 +69,7 @@ class SceneItem(pytest.Item):
             pytest.fail(str(error), pytrace=False)
         self._tell(outcome)
         if not outcome.passed:
-            again = [f"if this is as it should be: pytest --overlapper-record {self.nodeid.partition('::')[0]}"]
+            again = [f"to accept the change: pytest --overlapper-record {self.nodeid.partition('::')[0]}"]
             lines = [f"the scene {outcome.name} {WORDS[outcome.word]}", *outcome.lines]
             raise SceneMoved("\n".join(lines + again * (outcome.word == "moved")))
 

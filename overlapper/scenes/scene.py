@@ -108,7 +108,7 @@ def scenes_in(path: Path) -> list[Path]:
     """The scene files in a folder and its subfolders, sorted by path; or the one file. SceneError if there is none."""
     paths = [path] if path.is_file() else sorted(filter(is_scene, path.rglob("*.py")))
     if not paths:
-        raise SceneError(f"there is no scene in {path}" if path.is_dir() else f"there is no scene file {path}")
+        raise SceneError(f"the folder {path} has no scene" if path.is_dir() else f"there is no scene file {path}")
     return paths
 
 
@@ -139,11 +139,11 @@ def scene_of(path: Path, source: bytes) -> Scene:
     if path.suffix in FILES:
         return _scene_of_model(path)
     if not re.search(rb"\bSTEPS\b|\bimport \*", source):  # not run: a script may do anything, or never end
-        raise SceneError(f"{path} is no scene, as it has no STEPS: overlapper watch {path} runs a script as it is")
+        raise SceneError(f"{path} is not a scene, because it has no STEPS: overlapper watch {path} runs it as a script")
     module = _imported(path, source)
     steps, build = getattr(module, "STEPS", None), getattr(module, "build", None)
     if not isinstance(steps, int) or steps < 1:
-        raise SceneError(f"{path} must have STEPS, a whole number of steps from 1, but STEPS is {steps!r}")
+        raise SceneError(f"{path} must have STEPS, the number of steps, a whole number from 1, not {steps!r}")
     if not callable(build):
         raise SceneError(f"{path} must have a function build(client)")
     pairs = getattr(module, "PAIRS", "simulated")

@@ -27,6 +27,7 @@ from overlapper.tables.frame import Frame
 from overlapper.tables.outputs import Per, can_be_written, outputs
 from overlapper.tables.summary import Summary
 from overlapper.tables.table_file import origin
+from overlapper.whole_number import whole
 
 if TYPE_CHECKING:
     from overlapper.simulation import Recorder
@@ -115,7 +116,7 @@ class Watch:
         engine: str | None = None,
     ) -> None:
         of_engine = engine_of(engine or engine_that_has(physicsClientId))
-        if every < 1:
+        if whole(every, "every") < 1:
             raise ValueError(f"every must be a number of steps from 1, not {every}")
         if check not in (None, "fcl"):
             raise ValueError(f"check must be 'fcl' or None, not {check!r}")

@@ -53,10 +53,10 @@ class EllipsoidFacts(Round):
         return np.zeros(3), float(self.shape.half_axes.max())
 
     def fcl(self) -> str:
-        return "FCL is not asked about ellipsoids, of which no exact distance is known to judge it by."
+        return "FCL is not asked about ellipsoids, because no exact distance is known to compare with."
 
     def core_tip(self, direction: Floats) -> Floats:
-        raise TypeError("shape must not be an ellipsoid, of which no exact distance is known")
+        raise TypeError("shape must not be an ellipsoid, because its exact distance is not known")
 
     def support(self, direction: Exact, scale: int) -> tuple[Fraction, Fraction]:
         stretched = self.half_axes * direction

@@ -36,7 +36,7 @@ class HalfSpaceFacts(Flat):
         return "plane", f"normal {', '.join(f'{x:.4g}' for x in self.shape.normal)}", 0
 
     def tessellation(self) -> Tessellation:
-        raise TypeError("a half-space has no surface to draw: it is drawn as a ground")
+        raise TypeError("a half-space has no bounded surface to draw")
 
     def side(self, towards: Floats) -> tuple[Floats, float, Floats]:
         return np.asarray(self.shape.normal), float(self.shape.offset), np.empty((0, 3))

@@ -82,7 +82,7 @@ class HullFacts(Flat):
         solid = np.array([any(normal) for normal in normals])
         total = corners.sum(axis=0)
         if not is_closed(triangles) or any(normals[solid] @ total >= len(corners) * offsets[solid]):
-            raise ValueError("triangles of a hull must be a closed surface around the mean of its corners")
+            raise ValueError("triangles of a hull must be a closed surface around the mean of its vertices")
         # The normals are in squared units of the corners, the offsets in cubed units.
         rows = np.column_stack([normals * unit, offsets])
         return [_lowest(row) if has_area else None for row, has_area in zip(rows, solid)]
@@ -131,7 +131,7 @@ class HullFacts(Flat):
         """The hull itself, if all its corners are below all facets, so that the hull is not larger than its facets."""
         corners, unit = self.corners
         if not self.planes.hold(corners, unit, 0).all():
-            raise ValueError("a hull whose corners are not all below its facets has no certificate")
+            raise ValueError("a hull has no certificate if a vertex lies above a facet")
         return [Block([(row[:3], row[3]) for row in self.planes.rows], corners * Fraction(1, unit))]
 
 

@@ -82,7 +82,7 @@ class RoundedHullFacts(Round):
         return normal
 
     def exits(self, start: Exact, arms: Exact, scale: int, fine: int) -> Exact:
-        raise TypeError("where rays leave a rounded hull is not known exactly")
+        raise TypeError("the exact points where rays leave a rounded hull are not known")
 
     def blocks(self) -> list[Block]:
         core = self.core.blocks()
@@ -111,7 +111,7 @@ class RoundedHullFacts(Round):
                 else:
                     left.append(edges)
             if len(left) == len(thin):
-                raise ValueError("a hull of triangles without area has no certificate")
+                raise ValueError("a hull has no certificate if its triangles have no area")
             thin = left
         sides: dict[Row, list[Edge]] = {tuple(row): [] for row in self.core.planes.rows}
         for (p, q), plane in owner.items():

@@ -328,7 +328,7 @@ class AnyBodies:
         if named not in known:
             alike = get_close_matches(named, known, 1)
             hint = f"; {alike[0]!r} is" if alike else ""
-            raise ValueError(f"pairs names {named!r}, which is no body or link in the simulation{hint}")
+            raise ValueError(f"pairs names {named!r}, which is not a body or link in the simulation{hint}")
         return known[named]
 
     def _lost(self, id: int) -> Skipped:

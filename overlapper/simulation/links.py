@@ -158,6 +158,9 @@ def link_contacts(contacts: Iterable[Contact]) -> LinkContacts:
     """
     if not isinstance(contacts, Iterable):
         raise TypeError(f"contacts must be what Bodies.overlaps() returns, not {contacts!r}")
+    contacts = contacts if isinstance(contacts, Contacts) else [*contacts]
+    if strange := [each for each in contacts if not isinstance(each, Contact)]:
+        raise TypeError(f"contacts must be what Bodies.overlaps() returns, not {strange[0]!r} among them")
     ordered = sorted(contacts, key=lambda each: (_solids(each), _shapes(each)))
     pairs = [LinkContact(*solids, (each := tuple(group)), _union(each)) for solids, group in groupby(ordered, _solids)]
     return LinkContacts(pairs, contacts.names if isinstance(contacts, Contacts) else None)

@@ -47,7 +47,7 @@ def modelled(
 def _solid(data: bytes, modelling: Modelling) -> Decomposition:
     """A concave mesh as convex parts. NotDecomposed gives the reason of a failure."""
     if modelling.concave == "skip":
-        raise NotDecomposed("a concave mesh is left out, as concave='skip' asks")
+        raise NotDecomposed("a concave mesh is left out, because concave is 'skip'")
     found = _decomposition(data, modelling.concave == "enclose", modelling.concave_threshold)
     if isinstance(found, NotDecomposed):
         raise NotDecomposed(str(found))
@@ -100,7 +100,7 @@ def _shape(kind: str, data: bytes, margin: float) -> Shape:
         case "multisphere":
             raise ValueError("the hull of unequal spheres is not modelled")
         case "height field":
-            raise ValueError("a height field is modelled only if a Recorder has noted its heightfieldData")
+            raise ValueError("a height field is modelled only if a Recorder noted its heightfieldData")
         case _:
             raise ValueError(f"a {kind} is not modelled")
 

@@ -59,7 +59,7 @@ def _without_words_of_tools(name: str) -> str:
 
 def named(names: Mapping[int, str] | None) -> dict[int, str]:
     """The names given to bodies by their numbers, made printable. ValueError for an invalid name."""
-    wanted = "names must have names by the numbers of bodies, such as {3: 'duck'}, not "
+    wanted = "names must be a dictionary of names by the numbers of bodies, such as {3: 'duck'}, not "
     if not isinstance(names or {}, Mapping):
         raise ValueError(f"{wanted}{names!r}")
     for body, name in (names or {}).items():

@@ -55,7 +55,7 @@ class Report:
         )
         if self.pairs_within_margins:
             lines += (
-                f"\n{self.pairs_within_margins:,} more pairs of links touch only within the margins that Bullet lays "
-                "around hulls; surface 'margin' shows them"
+                f"\n{self.pairs_within_margins:,} more pairs of links touch only with the collision margins of Bullet; "
+                "surface='margin' measures them"
             )
         return lines

@@ -72,7 +72,7 @@ class Source(Protocol):
 
     def mechanics(self) -> Mechanics:
         """The interface that applies forces. ValueError if the simulator takes no forces."""
-        raise ValueError("this simulator takes no forces, so there is no volumetric contact in it")
+        raise ValueError("this simulator accepts no forces, so it has no volumetric contact")
 
     def close(self) -> None:
         """End the reading: no other method is called afterwards."""

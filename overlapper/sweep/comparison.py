@@ -99,12 +99,14 @@ class Comparison:
         moved, compared = int((self.parts > 1).sum()), len(self.numbers)
         by_measure = ", ".join(f"{name} in {count:,}" for name, count in self.counts.items())
         said = f"{moved:,} of {compared:,} tasks have moved since {self.folder}: {by_measure}."
-        lines = [said if moved else f"{compared:,} of {compared:,} tasks are as in {self.folder}."]
+        lines = [said if moved else f"All {compared:,} tasks are as in {self.folder}."]
         lines += [f"    {change}" for change in self.worst[:limit]]
         if moved > limit:
             lines.append(f"    and {moved - limit:,} more")
         if self.added or self.gone:
-            lines.append(f"Not compared: {self.added:,} that were not recorded, {self.gone:,} that are no more.")
+            lines.append(
+                f"Not compared: {self.added:,} new tasks, {self.gone:,} tasks that only the recorded sweep has."
+            )
         return lines
 
 
@@ -167,7 +169,7 @@ class Recorded:
         tables = [folder / f"{table}.parquet" for table in (FAILURES, TASKS)]
         files = [path for table in tables for path in sorted(table.glob("*.parquet"))]
         if not files:
-            raise ValueError(f"--check {folder}: there is no sweep in it")
+            raise ValueError(f"--check {folder}: the folder has no sweep")
         columns = [self._columns(path) for path in files]
         self._names = [name for name in sweep.points[0] if all(name in each for each in columns)]
         keys = np.fromiter((_key(point[name] for name in self._names) for point in sweep.points), "S16", len(sweep))
@@ -177,7 +179,7 @@ class Recorded:
         told = [TASK, *self._names]
         place = _places(len(sweep), (self._numbers(rows) for rows in self._counted(files, told)))
         if not (place >= 0).any():
-            raise ValueError(f"--check {folder}: it has none of the tasks of this sweep")
+            raise ValueError(f"--check {folder}: the folder has no task of this sweep")
         self._recorded = _Side(files, self._read, told, self._numbers, place)
 
     def _counted(self, files: Iterable[Path], told: Sequence[str]) -> Iterator[Any]:
@@ -189,13 +191,14 @@ class Recorded:
             keys.append(self._keys_of(rows))
         names, first = np.unique(np.concatenate(tasks), return_index=True)
         self._count = len(names)
-        self._must_differ(np.sort(np.concatenate(keys)[first]), "the sweep in it")
+        self._must_differ(np.sort(np.concatenate(keys)[first]), "the recorded sweep")
 
     def _must_differ(self, keys: Names, whose: str) -> None:
         """ValueError if two of the sorted keys are equal."""
         if (keys[1:] == keys[:-1]).any():
-            same = f"the same {', '.join(self._names)}" if self._names else "nothing to tell them apart"
-            raise ValueError(f"--check {self._folder}: by the parameters of both, tasks of {whose} have {same}")
+            alike = "cannot be told apart, because the sweeps have no common parameter"
+            same = f"have the same {', '.join(self._names)}" if self._names else alike
+            raise ValueError(f"--check {self._folder}: two tasks of {whose} {same}")
 
     def _columns(self, path: Path) -> set[str]:
         """The columns of a part. ValueError if a column that is compared is missing."""

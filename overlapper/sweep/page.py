@@ -175,7 +175,8 @@ def _moved(sweep: Sweep, comparison: Comparison) -> Iterable[str]:
     axes = [charts.axis(name, over[name]) for name in varied[:DRAWN]]
     if axes:
         means = (
-            "The mean of all tasks with a value, and the band that holds them; nothing of measures where one failed."
+            "Line: the mean of all tasks with a value. Band: from the least to the largest. "
+            "A measure is not drawn where a task failed."
         )
         yield f'<h2>Where it has moved</h2><p class="quiet">{means}</p>'
     for axis in axes:

@@ -46,7 +46,7 @@ def must_be_no_columns(defaults: Mapping[str, Parameter]) -> None:
     """ValueError if a parameter has the same name as a column of the tables."""
     for table, columns in OF.items():
         if taken := defaults.keys() & {TASK, *columns, *FORCES_OF[table]}:
-            raise ValueError(f"the parameter {min(taken)!r} has the name of a column of the table of {table}")
+            raise ValueError(f"the parameter {min(taken)!r} must not have the name of a column of the table {table}")
 
 
 def filled(table: str, found: Iterable[tuple[Task, Sequence[Row]]], heading: Mapping[str, str]) -> Any:

@@ -109,7 +109,7 @@ class Space:
     def seeds(self, count: int) -> Axis:
         """The parameter `seed` with `count` values, from 0 on."""
         if type(self.defaults.get("seed")) is not int:
-            raise ValueError(f"--seeds is for scenes with a parameter `seed`, a whole number; {self.scene} has none")
+            raise ValueError(f"--seeds needs a scene with a parameter `seed`, a whole number; {self.scene} has none")
         return Axis({"seed": range(count)})
 
     def samples(self, count: int, ranges: Sequence[str], seed: int) -> Axis:
@@ -119,7 +119,7 @@ class Space:
         asked = [self._range(text) for text in ranges]
         names = [name for name, *_ in asked]
         if twice := {name for name in names if names.count(name) > 1}:
-            raise ValueError(f"--range says {min(twice)} twice")
+            raise ValueError(f"--range gives {min(twice)} twice")
         try:
             from scipy.stats import qmc
         except ImportError as error:
@@ -133,7 +133,7 @@ class Space:
         parts = bounds.split(":")
         log = parts[-1] == "log"
         if isinstance(self.defaults[name], (str, bool)) or len(parts) != 2 + log:
-            raise ValueError(f"--range {text} must be {name}=FROM:TO or {name}=FROM:TO:log, of a number")
+            raise ValueError(f"--range {text} must be {name}=FROM:TO or {name}=FROM:TO:log, with two numbers")
         return name, *self._bounds(name, parts[:2], log, f"--range {text}"), log
 
     def _drawn(self, asked: tuple[str, float, float, bool], part: float) -> Parameter:
@@ -154,11 +154,11 @@ class Space:
             for name in names:
                 known(name, self.defaults, self.scene)
             if not names or len(set(names)) < len(names):
-                raise ValueError(f"{path} must have the names of parameters in its first line, each once")
+                raise ValueError(f"{path} must have the names of the parameters, each once, in its first line")
             points: list[list[Parameter]] = []
             for cells in rows:
                 if len(cells) != len(names):
-                    raise ValueError(f"{path}, line {reader.line_num}: it has {len(cells)} cells and not {len(names)}")
+                    raise ValueError(f"{path}, line {reader.line_num}: it has {len(cells)} cells, not {len(names)}")
                 try:
                     points.append([value_of(name, cell, self.defaults[name]) for name, cell in zip(names, cells)])
                 except ValueError as error:

@@ -60,7 +60,7 @@ def among(names: Names, known: Names) -> NDArray[np.bool_]:
 class Broken(ValueError):
     """A part differs from what was written. The text is a sentence with the path of the part."""
 
-    def __init__(self, path: Path, what: str = "is not as it was written") -> None:
+    def __init__(self, path: Path, what: str = "has changed since it was written") -> None:
         super().__init__(f"{path} {what}")
         self.path = path
 
@@ -197,14 +197,16 @@ class Store(Shelf):
                 begun.write_text(json.dumps(dict(identity), indent=1), encoding="utf-8")
             return
         except (ValueError, TypeError) as error:
-            raise ValueError(f"{there} does not say what is in {self.folder}: give another --out") from error
+            raise ValueError(
+                f"{there} is damaged, so the sweep in {self.folder} is not known: give another --out"
+            ) from error
         if known == dict(identity):
             return
         name = next((each for each in identity if known.get(each) != identity[each]), "scene")
         if name == "scene file":
-            raise ValueError(f"the scene file is not that of the sweep in {self.folder} any more: give another --out")
+            raise ValueError(f"the scene file has changed since the sweep in {self.folder} began: give another --out")
         was, now = known.get(name), identity.get(name)
-        raise ValueError(f"the sweep in {self.folder} is of {name} {was}, not {now}: give another --out")
+        raise ValueError(f"the sweep in {self.folder} has {name} {was}, not {now}: give another --out")
 
     def settle(self) -> None:
         """Read which tasks are done and which have failed.
@@ -338,5 +340,5 @@ def _locked(folder: Path) -> Any:
     try:
         lock.acquire()
     except Timeout as error:
-        raise ValueError(f"another sweep is at work in {folder}") from error
+        raise ValueError(f"another sweep is running in {folder}") from error
     return lock

@@ -35,7 +35,7 @@ def prepared(study: Study) -> Callable[[Task], dict[str, Any]]:
     """
     here = origin(engine_in(Path(study.path), study.source))
     if here != dict(study.versions):
-        raise ValueError(f"the sweep is of {_said(study.versions)}, but here is {_said(here)}")
+        raise ValueError(f"the sweep began with {_said(study.versions)}, but this machine has {_said(here)}")
     heading = study.identity()
 
     def done(task: Task) -> dict[str, Any]:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from numbers import Real
+from os import PathLike
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
 
+from overlapper.columns import Tabular
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.contacts import Contacts
 from overlapper.tables.outputs import StepTable
 from overlapper.tables.table_file import origin
+from overlapper.whole_number import whole
 
 if TYPE_CHECKING:
     from overlapper.simulation import Forces
@@ -64,6 +68,8 @@ class Log:
         forces: bool = False,
         **settings: Any,
     ) -> None:
+        if not isinstance(path, (str, PathLike)):
+            raise TypeError(f"path must be the name of a file, not {path!r}")
         if not isinstance(bodies, AnyBodies):
             raise TypeError(f"bodies must be the Bodies of a simulation, not {bodies!r}")
         Path(path).parent.mkdir(parents=True, exist_ok=True)
@@ -103,18 +109,20 @@ class Log:
             If the rows cannot be written.
         """
         if self._table is None:
-            raise ValueError(f"this Log is closed: {contacts!r} came too late")
+            raise ValueError(f"this Log is closed, so {contacts!r} cannot be added")
         if not isinstance(contacts, Contacts):
             raise TypeError(f"contacts must be what Bodies.overlaps() returns, not {contacts!r}")
         if forces is not None and not self._forces:
-            raise ValueError("this Log has no columns of forces: say Log(..., forces=True)")
-        step = self.steps + 1 if step is None else step
+            raise ValueError("this Log has no columns for forces: make it with Log(..., forces=True)")
+        if forces is not None and not isinstance(forces, Tabular):
+            raise TypeError(f"forces must be what VolumetricContact.mean() returns, not {forces!r}")
+        step = self.steps + 1 if step is None else whole(step, "step")
         if step <= self.steps:
             raise ValueError(f"step must be larger from one add() to the next: {step} came after {self.steps}")
         if time is None:
             time = step * self._bodies.time_step
-        if not math.isfinite(time):
-            raise ValueError(f"time must be finite, not {time}")
+        if not (isinstance(time, Real) and math.isfinite(time)):
+            raise ValueError(f"time must be a finite number of seconds, not {time!r}")
         strange = {key for row in contacts.keys.tolist() for key in (tuple(row[:3]), tuple(row[3:]))}
         if strange := strange.difference(self._bodies.keys):
             body, link, shape = min(strange)

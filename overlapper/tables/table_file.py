@@ -215,14 +215,14 @@ def _csv_text(path: Path) -> str:
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise ValueError(f"{path} is not a table of overlaps: it is no text ({first_line(error)})") from error
+        raise ValueError(f"{path} is not a table of overlaps: it is not text ({first_line(error)})") from error
     seal = re.search(r"^# rows: +([\d,]+), sha256 ([0-9a-f]{64})$", text, re.MULTILINE)
     if seal is None:
         return text[: text.rfind("\n") + 1]
     body = text[seal.end() + 1 :].encode()
     if hashlib.sha256(body).hexdigest() != seal[2]:
         other = _other(path, seal[1], _count(body))
-        raise ValueError(f"{other} (if that is as it should be, take out its line `# rows`)")
+        raise ValueError(f"{other} (to accept the change, remove its line `# rows`)")
     return text
 
 
@@ -231,8 +231,8 @@ def _other(path: Path, written: str, there: int) -> ValueError:
 
     `written` is the number of rows that was written, as text. `there` is the number of rows now.
     """
-    what = f"{there:,} of its {written} rows are there" if f"{there:,}" != written else "a line of it is another"
-    return ValueError(f"{path} is not as it was written: {what}")
+    what = f"it has {there:,} of its {written} rows" if f"{there:,}" != written else "a line has changed"
+    return ValueError(f"{path} has changed since it was written: {what}")
 
 
 def _sealed(path: Path, metadata: Mapping[str, str], columns: Sequence[str], rows: list[Row]) -> list[Row]:
@@ -285,7 +285,7 @@ def _heading(lines: Sequence[str]) -> dict[str, str]:
 
 def _row(columns: Sequence[str], cells: Sequence[str]) -> Row:
     if len(cells) != len(columns):
-        raise ValueError(f"it has {len(cells)} cells and not {len(columns)}")
+        raise ValueError(f"it has {len(cells)} cells, not {len(columns)}")
     return _checked({name: KNOWN[name](cell) if cell else None for name, cell in zip(columns, cells)})
 
 
@@ -306,11 +306,11 @@ def _checked(row: Row) -> Row:
         if kind is float and type(value) is int:
             row[name] = float(value)
         elif value is not None and type(value) is not kind:
-            raise ValueError(f"{name} is {value!r:.40}, which is no {kind.__name__}")
+            raise ValueError(f"{name} is {value!r:.40}, which is not {'an' if kind is int else 'a'} {kind.__name__}")
         elif kind is int and value is not None and not -(2**63) <= int(value) < 2**63:
-            raise ValueError(f"{name} is beyond 64 bits")
+            raise ValueError(f"{name} does not fit into 64 bits")
     if row["step"] is None:
-        raise ValueError("a row is of no step")
+        raise ValueError("a row has no step")
     return row
 
 
@@ -564,7 +564,7 @@ def _opened_parquet(path: Path) -> Iterator[Any]:
         for file in dataset.files:
             count, size = pyarrow.parquet.read_metadata(file).num_rows, os.path.getsize(file)
             if count > DENSEST * size:
-                raise ValueError(f"it claims {count:,} rows in {size:,} bytes")
+                raise ValueError(f"it states {count:,} rows, but has {size:,} bytes")
         yield dataset
     except (pyarrow.lib.ArrowException, OSError, ValueError, KeyError, RuntimeError) as error:
         raise _no_table(path, error) from error

@@ -175,7 +175,7 @@ def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 def loose_budgets(differences: Differences) -> list[str]:
     """A sentence for each budget that is ten times what these differences need. No sentence without differences."""
     loose = [
-        f"the budget of {name} is {1 / most:.3g} times what is needed"
+        f"the budget of {name} is {1 / most:.3g} times as large as needed"
         for name, most in differences.spent.items()
         if 0 < most < 0.1
     ]

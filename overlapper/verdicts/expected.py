@@ -153,14 +153,14 @@ def budgets_in(metadata: Mapping[str, str], path: Path) -> dict[str, Budget]:
             continue
         name = heading.removeprefix("budget ")
         if name not in (known := ROUNDING | DRIFT | FORCES):
-            raise ValueError(f"{path} has a budget of {name[:60]!r}, which is none of {', '.join(known)}")
+            raise ValueError(f"{path} has a budget for {name[:60]!r}, which must be one of {', '.join(known)}")
         try:
             relative, absolute = map(float, parts.groups())
         except ValueError:
             relative = math.nan
         if not (relative >= 0 and absolute >= 0):
             told = printable(" and ".join(parts.groups())[:60])
-            raise ValueError(f"{path} has a budget of {name} that is not two numbers from 0: {told}")
+            raise ValueError(f"{path} must have two numbers from 0 as budget of {name}, not {told}")
         budgets[name] = Budget(relative, absolute)
     return budgets
 
@@ -187,7 +187,7 @@ def _stills(content: Content) -> dict[int, Still]:
             stills[step] = Still.recorded(rows, known)
         except KeyError as error:
             lacking = "/".join(map(str, error.args[0]))
-            raise ValueError(f"the shape {lacking} of step {step} is in no line `# shapes`") from None
+            raise ValueError(f"no line `# shapes` has the shape {lacking} of step {step}") from None
         above += len(rows)
     return stills
 
@@ -196,5 +196,5 @@ def _key(text: str) -> Key:
     try:
         body, link, shape = map(int, text.split("/"))
     except ValueError:
-        raise ValueError(f"{text[:60]!r} is no shape of a link of a body, as 0/-1/0 is one") from None
+        raise ValueError(f"{text[:60]!r} must be body/link/shape, such as 0/-1/0") from None
     return body, link, shape

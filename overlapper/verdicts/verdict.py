@@ -65,12 +65,12 @@ class Verdict:
     def lines(self, limit: int = 5) -> list[str]:
         """The verdict on each cause, with its `limit` worst moves."""
         sections = {
-            "geometry": (self.geometry, "overlaps of the shapes and poses recorded, measured today"),
-            "shapes": (self.shapes, "what today's models are read as"),
-            "dynamics": (self.dynamics, "where today's simulation puts and pushes them"),
+            "geometry": (self.geometry, "overlaps of the recorded shapes and poses, measured today"),
+            "shapes": (self.shapes, "shapes of the models, read today"),
+            "dynamics": (self.dynamics, "poses and forces of the simulation of today"),
         }
         if self.overlaps:
-            sections["overlaps"] = (self.overlaps, "what comes of it, where it is more than a hundredth")
+            sections["overlaps"] = (self.overlaps, "overlaps of the simulation of today that changed by more than 1 %")
         lines = []
         for cause, (moves, meaning) in sections.items():
             lines.append(f"{cause:9} {f'{len(moves):,} moved' if moves else 'as recorded'} ({meaning})")
@@ -141,7 +141,8 @@ def _notes(geometry: Differences, shaken: dict[str, float], dynamics: Difference
     if not dynamics.moves:
         needed |= dynamics.spent
     notes = [
-        f"the budget of {name} is too narrow: rounding alone takes {part:.3g} times of it when all is moved by a metre"
+        f"the budget of {name} is too narrow: rounding errors are {part:.3g} times as large "
+        "when everything is moved by a metre"
         for name, part in shaken.items()
         if part > 1
     ]

@@ -52,6 +52,14 @@ class DrawnContact(Protocol):
     def overlap(self) -> Overlap: ...
 
 
+def must_be_drawn(bodies: object, contacts: object) -> None:
+    """TypeError unless these are bodies and a list of contacts."""
+    if not hasattr(bodies, "placed"):
+        raise TypeError(f"bodies must be the Bodies of a simulation, not {bodies!r}")
+    if not isinstance(contacts, Iterable):
+        raise TypeError(f"contacts must be what Bodies.overlaps() returns, not {contacts!r}")
+
+
 def link_names(bodies: DrawnBodies) -> dict[tuple[int, int], tuple[str, str]]:
     """The names of body and link in the tree. They have no slashes, as a slash begins a new level."""
     names = {}

@@ -19,7 +19,7 @@ import numpy as np
 
 from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker
 from overlapper.viewer.framing import Framing
-from overlapper.viewer.labels import DrawnBodies, DrawnContact, body_paths, key_of, labelled
+from overlapper.viewer.labels import DrawnBodies, DrawnContact, body_paths, key_of, labelled, must_be_drawn
 from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, volume_text
 from overlapper.viewer.pressure import DrawnForces, Forces, Scale, force_text
 from overlapper.viewer.recording import Recording
@@ -93,6 +93,7 @@ class Viewer:
         forces : Forces, optional
             Forces to draw.
         """
+        must_be_drawn(bodies, contacts)
         contacts = list(contacts)
         if self._stage is None or self._framing is None:
             self._framing = Framing(bodies)

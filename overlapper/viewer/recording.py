@@ -25,7 +25,17 @@ from numpy.typing import NDArray
 from overlapper import Overlap, Placed
 from overlapper.shapes.table import facts
 from overlapper.viewer.framing import Framing, View
-from overlapper.viewer.labels import ROOT, DrawnBodies, DrawnContact, LinkName, Pair, body_paths, key_of, labelled
+from overlapper.viewer.labels import (
+    ROOT,
+    DrawnBodies,
+    DrawnContact,
+    LinkName,
+    Pair,
+    body_paths,
+    key_of,
+    labelled,
+    must_be_drawn,
+)
 from overlapper.viewer.look import (
     BODIES,
     INK,
@@ -146,6 +156,7 @@ class Recording:
         ValueError
             If `time` is not later than that of the frame before.
         """
+        must_be_drawn(bodies, contacts)
         if not isinstance(time, Real):
             raise TypeError(f"time must be a number of seconds, not {time!r}")
         if self._stage is None or self._framing is None:
@@ -155,7 +166,7 @@ class Recording:
             self._visualizer[ROOT].set_transform(translation_matrix(self._stage.center))
         seconds = time - self._start
         if self._times and not seconds > self._times[-1]:
-            raise ValueError(f"time must increase from frame to frame: {time} s came no later than the frame before")
+            raise ValueError(f"time must increase from frame to frame: {time} s is not later than the frame before")
         self._times.append(seconds)
         self._names.append(name)
         for each in getattr(bodies, "skipped", ()):  # bodies outside a simulation have no `skipped`

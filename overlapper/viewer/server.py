@@ -23,7 +23,7 @@ def must_be_here(host: str) -> None:
         with closing(socket.create_server((host, 0), family=family)):
             pass
     except (OSError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is no name"
+        reason = getattr(error, "strerror", None) or "it is not a valid name"
         raise ValueError(f"host must be an address of this machine, not {host!r}: {reason}") from error
 
 

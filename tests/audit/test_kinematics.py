@@ -89,10 +89,10 @@ def test_continuous_joints_turn_once_and_unbounded_joints_stay(tmp_path):
 @pytest.mark.parametrize(
     ("more", "sentence"),
     [
-        (mimic("nobody"), "the joint 'j' mimics 'nobody', which is no joint that one number moves"),
+        (mimic("nobody"), "the joint 'j' mimics 'nobody', which is not a revolute or prismatic joint"),
         (mimic("j"), "the joint 'j' mimics itself"),
         (mimic("k"), "the joint 'j' mimics itself"),
-        (mimic("k", "much"), "the joint 'j' has <mimic multiplier='much'>, which is no number"),
+        (mimic("k", "much"), "the joint 'j' has <mimic multiplier='much'>, which is not a number"),
     ],
 )
 def test_a_mimic_joint_without_a_master_is_refused_in_one_sentence(more, sentence, tmp_path):
@@ -112,5 +112,5 @@ def test_text_after_the_robot_is_ignored_and_invalid_xml_is_refused(tmp_path):
     path.write_text(f"{whole}\n</robot> & so on")
     assert len(read_robot(path).tree.shapes) == 1
     path.write_text(whole.replace("<link", '<material name="&unknown;"/><link'))
-    with pytest.raises(NotRead, match=r"robot.urdf cannot be read: it is no XML: undefined entity: line 1"):
+    with pytest.raises(NotRead, match=r"robot.urdf cannot be read: it is not XML: undefined entity: line 1"):
         read_robot(path)

@@ -114,9 +114,9 @@ def test_an_equality_of_joints_is_a_mimic_and_others_are_remarked_upon(tmp_path)
     bent = read_robot(arm(tmp_path / "bent.xml", rest=tie.replace("2 0 0 0", "2 1 0 0")))
     weld = '<equality><weld body1="lower"/><joint joint1="elbow"/></equality>'
     welded = read_robot(arm(tmp_path / "welded.xml", rest=weld))
-    assert remarks(bent) == ["An <equality> of kind joint is not read: what it ties moves freely."]
+    assert remarks(bent) == ["An <equality> of kind joint is not read: what it couples moves freely."]
     assert remarks(welded) == [
-        f"An <equality> of kind {kind} is not read: what it ties moves freely." for kind in ("weld", "joint")
+        f"An <equality> of kind {kind} is not read: what it couples moves freely." for kind in ("weld", "joint")
     ]
     loop = tie.replace("</equality>", '<joint joint1="shoulder" joint2="elbow"/></equality>')
     with pytest.raises(NotRead, match="mimics itself"):
@@ -149,7 +149,7 @@ def test_what_cannot_be_read_or_modelled_is_told(tmp_path):
             read_robot(path)
     with pytest.raises(NotRead, match=r"there is no file .*none\.xml"):
         read_robot(tmp_path / "none.xml")
-    with pytest.raises(NotRead, match="is read by MuJoCo, which has no surface but 'nominal'"):
+    with pytest.raises(NotRead, match="is read by MuJoCo, which has only the surface 'nominal'"):
         read_robot(arm(tmp_path / "arm.xml"), Modelling(surface="margin"))
     hills = '<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>'
     upper = '<body name="upper"'

@@ -112,7 +112,7 @@ def test_a_failed_block_is_reported(table, monkeypatch):
 
     monkeypatch.setattr(auditing, "FEW", 0)
     with pytest.raises(
-        RuntimeError, match=r"^configurations of block 7: its process ended with signal SIGKILL\nwords$"
+        RuntimeError, match=r"^block 7 of configurations failed: its process ended with signal SIGKILL\nwords$"
     ):
         audit(table, 10, engine=Broken())
 

@@ -64,7 +64,7 @@ def wrecked(tmp_path):
 
 def test_a_mesh_that_pybullet_cannot_read_is_told_in_findings_rows_json_and_srdf(wrecked, tmp_path):
     robot = read_robot(wrecked)
-    reason = "pybullet has built 1 of the 2 shapes that the file names, and not wreck.obj"
+    reason = "pybullet built 1 of the 2 shapes in the file, without wreck.obj"
     assert not_modelled(robot) == {"hip": reason}
     found = audit(robot, 20)
     assert findings(found, [], {}) == [f"Not modelled: hip, {reason}."]
@@ -89,7 +89,7 @@ def test_each_kind_of_mesh_that_gives_no_shape_is_told(name, tmp_path):
     (tmp_path / name).write_bytes(b"" if "empty" in name else WRECK)
     (tmp_path / "good.obj").write_text(f"o one\n{TETRAHEDRON}o two\n{CORNERS}f 5 7 6\nf 5 6 8\nf 6 7 8\nf 5 8 7\n")
     robot = read_robot(arm(tmp_path / "arm.urdf", name, "good.obj"))
-    assert not_modelled(robot) == {"hip": f"pybullet has built 1 of the 2 shapes that the file names, and not {name}"}
+    assert not_modelled(robot) == {"hip": f"pybullet built 1 of the 2 shapes in the file, without {name}"}
     assert not not_modelled(read_robot(arm(tmp_path / "whole.urdf", "good.obj")))
 
 
@@ -101,7 +101,7 @@ def test_shapes_of_sdf_are_counted_too(tmp_path):
     tie = '<joint name="j" type="fixed"><parent>a</parent><child>b</child></joint>'
     (tmp_path / "m.sdf").write_text(f'<sdf version="1.4"><model name="m">{links}{tie}</model></sdf>')
     (reason,) = not_modelled(read_robot(tmp_path / "m.sdf")).values()
-    assert reason == "pybullet has built 1 of the 2 shapes that the file names, and not wreck.stl"
+    assert reason == "pybullet built 1 of the 2 shapes in the file, without wreck.stl"
 
 
 def bodies_of(path, recorded=True, flags=0, **arguments):
@@ -123,7 +123,7 @@ def test_bodies_know_of_lost_meshes_by_a_recorder_and_warn_once(wrecked, tmp_pat
         bodies = bodies_of(wrecked)
     ((id, link, name, reason),) = [(each.body, each.link, each.name, each.reason) for each in bodies.skipped]
     assert (id, link, name) == (0, -1, "arm/hip")
-    assert reason == "pybullet has built 1 of the 2 shapes that the file names, and not wreck.obj"
+    assert reason == "pybullet built 1 of the 2 shapes in the file, without wreck.obj"
     assert len(warned) == 1 and str(warned[0].message).endswith(f"is left out: {reason}")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -141,7 +141,7 @@ def test_a_lost_mesh_and_a_flat_one_are_one_entry_of_their_link(tmp_path):
     (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n")
     with pytest.warns(SkippedShapeWarning):
         (skipped,) = bodies_of(arm(tmp_path / "arm.urdf", "wreck.obj", "flat.obj")).skipped
-    assert "and not wreck.obj; " in skipped.reason and "flat" in skipped.reason
+    assert "without wreck.obj; " in skipped.reason and "flat" in skipped.reason
 
 
 def test_a_model_found_on_the_search_path_is_counted(wrecked, monkeypatch, tmp_path):
@@ -163,7 +163,7 @@ def test_a_scene_tells_of_a_lost_mesh(wrecked, tmp_path):
     scene.write_text(f'"""An arm."""\nimport pybullet as p\nSTEPS = 2\n\n\ndef build(client):\n    {load}\n')
     command = [sys.executable, "-m", "overlapper", "run", str(scene)]
     done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 1 and "Not modelled: arm/hip, pybullet has built 1 of the 2 shapes" in done.stdout
+    assert done.returncode == 1 and "Not modelled: arm/hip, pybullet built 1 of the 2 shapes" in done.stdout
 
 
 def test_sdf_that_includes_others_is_refused(tmp_path):
@@ -182,18 +182,20 @@ def test_what_is_no_file_is_refused_before_pybullet_opens_it(tmp_path):
     (tmp_path / "zero.stl").symlink_to("/dev/zero")
     for name in ("pipe.obj", "folder.obj", "zero.stl", "package://pipe.obj"):
         said = refusal(arm(tmp_path / "arm.urdf", name))
-        assert said == f"it names {name!r}, which is a pipe, a device or a folder, and no file"
+        assert said == f"it names {name!r}, which is a pipe, a device or a folder, not a file"
     os.mkfifo(tmp_path / "library")
     (tmp_path / "of_library.obj").write_text(f"mtllib library\n{TETRAHEDRON}")
     assert "names 'library'" in refusal(arm(tmp_path / "arm.urdf", "of_library.obj"))
     assert found(tmp_path / "arm.urdf", "none.obj") is None and found(tmp_path / "arm.urdf", "x" * 999) is None
-    with pytest.raises(ValueError, match=r"library is no SRDF, and no file$"):
+    with pytest.raises(ValueError, match=r"^there is no SRDF file .*library$"):
         read_srdf(tmp_path / "library")
 
 
 def test_corners_that_are_no_numbers_are_refused(tmp_path):
     (tmp_path / "nan.obj").write_text(TETRAHEDRON.replace("v 1 0", "v nan 0"))
-    assert refusal(arm(tmp_path / "arm.urdf", "nan.obj")) == "it names 'nan.obj', which has corners that are no numbers"
+    assert (
+        refusal(arm(tmp_path / "arm.urdf", "nan.obj")) == "it names 'nan.obj', which has vertices that are not numbers"
+    )
 
 
 @pytest.mark.parametrize(
@@ -204,8 +206,8 @@ def test_corners_that_are_no_numbers_are_refused(tmp_path):
         (joint("j", "revolute", "a", "b", limit("nan", "nan")), "the joint 'j' has <limit lower='nan'>"),
         (joint("j", "revolute", "a", "b", mimic("k", "nan")), "the joint 'j' has <mimic multiplier='nan'"),
         (joint("j", "fixed", "a", "b") + link("c", ("1 inf 1", "0 0 0")), "a collision shape of the link 'c' has <box"),
-        ("<link>" * 130, "it is no XML: "),
-        (" " * 7000 + link("c" * 3000), "pybullet breaks its lines after 8,191 bytes, and would break a word or"),
+        ("<link>" * 130, "it is not XML: "),
+        (" " * 7000 + link("c" * 3000), "pybullet breaks lines after 8,191 bytes, which would break a word or"),
     ],
 )
 def test_a_urdf_that_pybullet_would_misunderstand_is_refused_with_the_joint_or_link(text, sentence, tmp_path):
@@ -217,7 +219,7 @@ def test_a_urdf_that_pybullet_would_misunderstand_is_refused_with_the_joint_or_l
 
 def test_a_urdf_of_more_links_than_pybullet_places_is_refused(tmp_path):
     path = urdf(tmp_path / "robot.urdf", *(link(f"l{k}") for k in range(132)))
-    assert refusal(path) == "it has 132 links, and pybullet tells the poses of 128 at most"
+    assert refusal(path) == "it has 132 links, but pybullet returns the poses of at most 128"
 
 
 def test_a_fixed_joint_may_have_no_axis_and_a_long_line_may_break_between_elements(tmp_path):
@@ -245,7 +247,7 @@ def test_mjcf_that_pybullet_reads_as_it_is_meant_is_read(tmp_path):
 def test_what_mjcf_ties_by_equality_is_remarked_upon(tmp_path):
     tie = '<compiler/><equality><joint joint1="bend" joint2="other"/></equality>'
     robot = read_robot(mjcf(tmp_path / "robot.xml", tie))
-    assert remarks(robot) == ["The <equality> of the file is not read: what it ties moves freely."]
+    assert remarks(robot) == ["The <equality> of the file is not read: the joints that it couples move freely."]
 
 
 DEFAULT = '<compiler/><default><default class="knee"><joint range="-20 20" limited="true"/></default></default>'
@@ -278,9 +280,7 @@ def test_what_pybullet_would_change_of_mjcf_is_named(changed, reason, tmp_path):
 def test_the_refusal_of_mjcf_has_three_reasons_and_counts_the_others(tmp_path):
     path = mjcf(tmp_path / "robot.xml", more='ref="1" range="0 1"', geom="")
     said = refusal(path)
-    assert said.startswith(
-        "pybullet's importer of MJCF would change what it says: the joint bend has no type, and is a"
-    )
+    assert said.startswith("pybullet would read the MJCF file wrongly: the joint bend has no type, and is a")
     assert said.endswith("; and 1 more") and said.count("; ") == 3
 
 
@@ -316,7 +316,7 @@ def test_a_model_without_a_body_is_refused_alone_and_in_a_folder(tmp_path):
         ("", ["arm and wall are disabled by the SRDF file without a reason, and overlap in "]),
         ("Adjacent", ["arm and wall are disabled by the SRDF file as 'Adjacent', and overlap in "]),
         ("Always", ["arm and wall are disabled by the SRDF file as 'Always', and overlap in "]),
-        ("Never", ["arm and wall never overlap by the SRDF file, and do in "]),
+        ("Never", ["arm and wall never overlap by the SRDF file, but overlap in "]),
     ],
 )
 def test_a_disabled_pair_that_overlaps_sometimes_is_a_finding_whatever_the_reason(reason, told, tmp_path):

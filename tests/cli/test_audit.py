@@ -45,7 +45,7 @@ def test_an_audit_is_written_as_json_table_srdf_and_page(robot, tmp_path):
     found = json.loads(said)
     assert (code, complaints) == (1, "")
     assert found["findings"] == [
-        f"{names} always overlap, and no joint ties them." for names in ("arm and plate", "wall and plate")
+        f"{names} always overlap, and no joint connects them." for names in ("arm and plate", "wall and plate")
     ]
     assert (found["robot"], found["joints"], found["settings"]["seed"]) == ("made", ["turn"], 4)
     pairs = {(each["nameA"], each["nameB"]): each for each in found["pairs"]}
@@ -95,8 +95,11 @@ def test_an_srdf_file_that_disables_an_overlapping_pair_is_reported(robot, tmp_p
     code, said, _ = run(robot, "--against", "table.srdf")
     assert code == 1
     assert "The SRDF file names the link 'roof', which the robot does not have.\n" in said
-    assert "arm and wall never overlap by the SRDF file, and do in " in said
+    assert "arm and wall never overlap by the SRDF file, but overlap in " in said
     assert "no joint ties them" not in said
+
+
+MUST_NAME = "a <disable_collisions> must name link1 and link2, not {'link1': 'arm'}"
 
 
 @pytest.mark.parametrize(
@@ -107,11 +110,11 @@ def test_an_srdf_file_that_disables_an_overlapping_pair_is_reported(robot, tmp_p
         ({"out": "pairs.txt"}, "--out must end in .csv, .parquet, .sqlite, not 'pairs.txt'"),
         ({"srdf": "."}, ".: Is a directory"),
         ({"against": "none.srdf"}, "none.srdf: No such file or directory"),
-        ({"against": "table.urdf.txt"}, "table.urdf.txt is no SRDF: syntax error: line 1, column 0"),
-        ({"against": "sdf.srdf"}, "sdf.srdf is no SRDF: it is of <sdf> and not of <robot>"),
-        ({"against": "half"}, "half is no SRDF: a <disable_collisions> names no two links, but {'link1': 'arm'}"),
+        ({"against": "table.urdf.txt"}, "table.urdf.txt is not an SRDF file: syntax error: line 1, column 0"),
+        ({"against": "sdf.srdf"}, "sdf.srdf is not an SRDF file: its root is <sdf>, not <robot>"),
+        ({"against": "half"}, "half is not an SRDF file: " + MUST_NAME),
         ({"robot": "none.urdf"}, "there is no file none.urdf"),
-        ({"robot": "table.bullet"}, "the name must end in .urdf, .sdf, .xml, and 'table.bullet' does not"),
+        ({"robot": "table.bullet"}, "the name must end in .urdf, .sdf, .xml, not 'table.bullet'"),
         ({"robot": "bare.urdf"}, "bare.urdf has no two links with shapes that could overlap"),
         ({"robot": "one.urdf"}, "one.urdf has no two links with shapes that could overlap"),
     ],
@@ -178,6 +181,6 @@ def test_unmoved_joints_and_unmodelled_shapes_are_reported(tmp_path):
     robot = read_robot(path)
     assert [*not_modelled(robot)] == ["flat"]
     assert remarks(robot) == [
-        "The prismatic joint slide stays where it is, as it has no limits.",
-        "The planar joint table stays where it is, as pybullet does not move it.",
+        "The prismatic joint slide stays at rest, because it has no limits.",
+        "The planar joint table stays at rest, because pybullet does not move it.",
     ]

@@ -63,9 +63,7 @@ def test_every_asset_of_a_folder_is_reported(folder):
     assert {name for name, asset in found.items() if asset["sound"]} == {"bent.obj", "cube.stl"}
     assert found["broken.stl"]["failure"].startswith("is not a mesh that can be read")
     assert found["open.ply"]["closed"] is False
-    assert found["open.ply"]["skipped"] == [
-        "open.ply: the concave mesh bounds no volume: its surface is open along 3 edges"
-    ]
+    assert found["open.ply"]["skipped"] == ["open.ply: the concave mesh bounds no volume: its surface has 3 open edges"]
     # The L is three cubes of 1 cm, its hull has half a cube more.
     assert (found["bent.obj"]["closed"], found["bent.obj"]["shapes"]) == (True, 1)
     assert found["bent.obj"]["excess"] == pytest.approx(1 / 6) and found["cube.stl"]["excess"] is None
@@ -86,7 +84,7 @@ def test_a_table_of_assets_has_a_row_for_each(folder, tmp_path):
         **dict.fromkeys(("open.ply", "pair.glb", "robots/table.urdf"), "not sound"),
         "broken.stl": "not read",
     }
-    assert rows["broken.stl"]["failure"] and "open along 3 edges" in rows["open.ply"]["not_modelled"]
+    assert rows["broken.stl"]["failure"] and "its surface has 3 open edges" in rows["open.ply"]["not_modelled"]
     (shared,) = json.loads(rows["pair.glb"]["overlaps"])
     assert sorted(shared["names"]) == ["left", "right"] and "# units: mm" in lines
 
@@ -108,7 +106,7 @@ def test_people_get_a_table_and_sentences(folder):
 
 def test_concave_meshes_may_be_left_out_and_shallow_overlaps_passed_over(folder):
     skipped = read_asset(folder, folder / "bent.obj", "mm", 0.0, Modelling("skip"))
-    assert skipped.skipped == ("bent.obj: the mesh is concave, and --concave skip asks to leave it out",)
+    assert skipped.skipped == ("bent.obj: the mesh is concave, and --concave skip leaves out concave meshes",)
     assert (skipped.closed, skipped.sound) == (True, False)
     assert read_asset(folder, folder / "pair.glb", "mm", 2.1, Modelling()).sound
     table = read_asset(folder, folder / "robots" / "table.urdf", "mm", 0.05, Modelling())
@@ -135,8 +133,8 @@ def test_an_error_in_one_asset_does_not_stop_the_others(folder, monkeypatch):
 
 
 def test_options_for_robots_and_an_empty_folder_are_refused(folder, tmp_path):
-    with pytest.raises(Refused, match=r"^--srdf is for a robot, and .*assets is a folder$"):
+    with pytest.raises(Refused, match=r"^--srdf needs a robot, but .*assets is a folder$"):
         command(folder, srdf=tmp_path / "out.srdf")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(Refused, match=r"^there is no model and no mesh in the folder .*empty: \.urdf, "):
+    with pytest.raises(Refused, match=r"^the folder .*empty has no model and no mesh with one of the endings \.urdf, "):
         command(tmp_path / "empty")

@@ -110,7 +110,7 @@ def test_help_shows_examples_and_a_bare_command_prints_help():
 
 def test_help_is_broken_at_the_margin_only_and_has_a_short_name():
     text = overlapper("run", "-h", COLUMNS="200", TERMINAL_WIDTH="200").stdout
-    assert "which fills a pybullet client. It may return a function step(i), which is called before" in text
+    assert "which fills a pybullet client. build(client) may return a function step(i)" in text
 
 
 def test_scenes_are_listed_with_what_happens_in_them():
@@ -373,7 +373,7 @@ def test_rows_before_a_failure_are_on_disk(tmp_path, ending):
     left = f"fails.unfinished.{ending.replace('parquet', 'csv')}"
     assert sentence.endswith(
         "fails before step 6 at line 17: AssertionError: no more; "
-        f"what came before is in {left} and fails.unfinished.html\n"
+        f"the steps before are in {left} and fails.unfinished.html\n"
     )
     assert [row["step"] for row in read_table(tmp_path / left)] == [1, 2, 3, 4, 5]
     assert (tmp_path / "fails.unfinished.html").stat().st_size > 0
@@ -447,7 +447,7 @@ def test_a_disk_that_is_full_costs_no_earlier_file(tmp_path, ending, room):
     assert said.startswith("overlapper: cannot write ") and said.count("\n") == 1
     assert (tmp_path / f"old.{ending}").read_text() == "of yesterday"
     kept = tmp_path / f"old.unfinished.{ending.replace('parquet', 'csv')}"
-    assert ("; what came before is in" in said) == kept.exists()
+    assert ("; the steps before are in" in said) == kept.exists()
     if kept.exists():
         steps = [row["step"] for row in read_table(kept)]
         assert steps == list(range(1, len(steps) + 1))
@@ -456,7 +456,7 @@ def test_a_disk_that_is_full_costs_no_earlier_file(tmp_path, ending, room):
 LACKING = {
     "room": (
         "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2500, 2500))",
-        "overlapper: the scene lacking.py cannot be read: the physics server of physicsClientId 0 could not hand over",
+        "overlapper: the scene lacking.py cannot be read: the physics server of physicsClientId 0 could not write its",
     ),
     "memory": (
         "import overlapper.simulation as s; s.Bodies.overlaps = lambda *_, **__: (_ for _ in ()).throw(MemoryError())",
@@ -564,7 +564,7 @@ def test_a_scene_that_diverges_has_moved_and_is_not_recorded(two_scenes):
     assert code == 1 and "box#1" in said and "note      not modelled: box#1, it has no finite pose" in said
     code, said, complaints = checked("guarded/one.py", "--record")
     assert (code, said) == (2, "")
-    assert complaints.endswith("overlapper: guarded/one.py is not recorded: box#1 has diverged in step 6\n")
+    assert complaints.endswith("overlapper: guarded/one.py is not recorded, because box#1 diverged in step 6\n")
     done = overlapper("run", "guarded/one.py", "--out", "one.csv")
     assert done.returncode == 1 and "\nNot modelled from step 5 on: box#1, it has no finite pose" in done.stdout
     assert overlapper("run", "guarded/deeper/two.py", "--out", "two.csv").returncode == 0
@@ -579,7 +579,7 @@ def test_a_new_scene_is_written_with_exit_code_1_once(two_scenes):
     assert checked("guarded/three.py")[:2] == (
         1,
         "guarded/three.py: new\n    written: guarded/expected/three.csv\n"
-        "    look at it, commit it, and the scene is guarded from now on\n",
+        "    look at the file and commit it: later runs are compared with it\n",
     )
     assert checked("guarded/three.py")[0] == 0
 
@@ -666,7 +666,7 @@ def test_scenes_are_refused_if_no_process_can_start(two_scenes, monkeypatch):
     ("spoil", "words"),
     [
         (lambda folder: folder / "nowhere", "there is no scene file"),
-        (lambda folder: folder / "expected", "there is no scene in"),
+        (lambda folder: folder / "expected", "the folder"),
         (
             lambda folder: (folder / "expected" / "one.csv").write_text("# steps") and folder,
             "expected/one.csv is not a table of overlaps: it has no columns",

@@ -71,13 +71,15 @@ def test_a_table_is_viewed_with_its_own_contact_model():
     text = Path("cube.csv").read_text()
     Path("cube.csv").write_text(text.replace("# contact: volumetric", "# contact: bullet"), encoding="utf-8")
     done = overlapper("view", "cube.csv", "--scene", "cube.py", "--png", "cube.png")
-    assert "what is seen is not what cube.csv has, as the simulation has changed" in done.stderr
+    assert "the steps shown differ from cube.csv, because the simulation has changed" in done.stderr
 
 
 def test_a_scene_is_viewed_with_the_requested_contact_model():
     overlapper("view", "cube.py", "--contact", "volumetric", "--png", "cube.png")
     done = overlapper("view", "cube.csv", "--contact", "volumetric", code=2)
-    assert done.stderr == "overlapper: --contact is for scenes, and cube.csv is a table, which says its own\n"
+    assert (
+        done.stderr == "overlapper: --contact is for scenes, but cube.csv is a table, which has its own contact model\n"
+    )
 
 
 def test_a_table_with_an_unknown_contact_model_is_refused():
@@ -108,7 +110,7 @@ def test_a_sweep_keeps_the_largest_force_and_compares_it():
     assert [row["force_z_n"] for row in steps if row["mass"] == 2] == pytest.approx([-19.62] * 3)
     page = Path("runs/summary.html").read_text(encoding="utf-8")
     assert "largest force, N" in page and "--contact=volumetric" in page
-    assert overlapper(*given, "--out", "again", "--check", "runs").stdout.count("2 of 2 tasks are as in runs.") == 1
+    assert overlapper(*given, "--out", "again", "--check", "runs").stdout.count("All 2 tasks are as in runs.") == 1
     for part in Path("again/tasks.parquet").glob("*.parquet"):
         row = pyarrow.parquet.read_table(part)
         where = row.schema.get_field_index("largest_force_n")
@@ -132,4 +134,4 @@ def test_contacts_without_a_direction_are_reported_once():
     Path("within.py").write_text(WITHIN, encoding="utf-8")
     done = overlapper("run", "within.py")
     (line,) = done.stderr.splitlines()
-    assert line.startswith("overlapper: box/link0 and sphere/link0 share a volume without a side to push to")
+    assert line.startswith("overlapper: box/link0 and sphere/link0 overlap without a direction of force")

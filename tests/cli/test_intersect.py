@@ -160,7 +160,7 @@ def test_open_meshes_and_invalid_files_are_refused_with_concave(tmp_path):
     (tmp_path / "open.obj").write_text(without_a_facet(L_SHAPE))
     (tmp_path / "words.stl").write_text("hello")
     for name, reason in (
-        ("open.obj", r"not measured: .* its surface is open"),
+        ("open.obj", r"not measured: .* its surface has \d+ open edges"),
         ("words.stl", "not a mesh that can be"),
     ):
         done = intersect("one.stl", name, "--concave")
@@ -187,7 +187,7 @@ def test_without_coacd_the_hull_gives_the_place_and_the_output_says_so(tmp_path,
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     done = intersect("one.stl", "bent.obj", "--concave")
     assert "volume    1 ± " in done.stdout
-    assert "overlapper: The convex hull stands for bent.obj: CoACD failed" in done.stderr
+    assert "overlapper: The convex hull of bent.obj is used instead: CoACD failed" in done.stderr
     assert "overlapper: convex parts of bent.obj: hull, +16.7% of its volume\n" in done.stderr
 
 
@@ -221,15 +221,18 @@ def test_a_query_only_reads(tmp_path, query):
         (["one.stl", "two.obj", "--out", "common.step"], "a mesh must end in .obj, .stl, .ply, not 'common.step'"),
         (["sqlite:///none.db"], "there is no database none.db"),
         (["sqlite://"], "the database says: no such table: polytopes"),
-        (["one.stl", "--concave"], "--concave is of two mesh files; overlapper clashes takes all pairs of more"),
+        (
+            ["one.stl", "--concave"],
+            "--concave takes two mesh files; overlapper clashes takes more, and measures all pairs",
+        ),
         (
             ["one.stl", "sqlite://", "--concave"],
-            "--concave is of two mesh files; overlapper clashes takes all pairs of more",
+            "--concave takes two mesh files; overlapper clashes takes more, and measures all pairs",
         ),
         (["one.stl", "none.stl", "--concave"], "none.stl: No such file or directory"),
         (
             ["one.stl", "two.obj", "--concave", "--method", "paper"],
-            "--concave and --method paper do not go together: that method is for polytopes",
+            "--concave and --method paper exclude each other: the method `paper` is for polytopes",
         ),
     ],
 )

@@ -40,7 +40,7 @@ def test_ten_disagreements_are_listed_and_the_rest_is_counted():
     lines = remarks(summary)
     assert lines[0] == "FCL on 1,012 pairs that overlap or touch: 1,000 agree, 12 disagree."
     assert lines[1] == "  step 1, a/base – b/base, disagree: By a hair."
-    assert lines[11:] == ["  and 2 more, each explained in the file of --out and by --json."]
+    assert lines[11:] == ["  and 2 more, each explained in the table of --out and in the output of --json."]
     assert len(remarks(Summary("pile", verdicts=summary.verdicts, disagreements=many[:10]))) == 11
 
 
@@ -71,5 +71,5 @@ def test_skipped_shapes_and_examined_pairs_are_reported():
 
 def test_pairs_that_only_margins_separate_are_reported():
     summary = Summary("pile", report=Report(1, 3, 2, 1, 1, 0, 0, 9, 8, pairs_within_margins=147))
-    assert remarks(summary)[-1].startswith("147 more pairs of links touch only within the margins that Bullet lays")
+    assert remarks(summary)[-1].startswith("147 more pairs of links touch only with the collision margins of Bullet")
     assert summary.as_dict()["report"]["pairs_within_margins"] == 147

@@ -62,7 +62,7 @@ def test_json_lists_failures_with_exit_code_1():
     text = sweep("--grid", "fate=good,raises", "--points", "points.csv", "--out", "runs").stdout.splitlines()
     assert text[0] == "balls: 2 of 4 tasks are done, 2 of them before."
     assert re.fullmatch(r"Failed: apart=0.1\d*, seed=0, fate=raises, seconds=0.0: .*apart must be more", text[1])
-    assert text[3] == "Tracebacks: runs/failures.parquet; --retry does them again"
+    assert text[3] == "Tracebacks: runs/failures.parquet; --retry runs these tasks again"
 
 
 def test_a_sweep_says_what_has_moved_since_another():
@@ -70,7 +70,7 @@ def test_a_sweep_says_what_has_moved_since_another():
     assert sweep(*words, "--out", "before").returncode == 1
     # A task that failed in both sweeps has not moved.
     same = sweep(*words, "--out", "same", "--check", "before")
-    assert same.returncode == 0 and "\n12 of 12 tasks are as in before.\nWritten: " in same.stdout
+    assert same.returncode == 0 and "\nAll 12 tasks are as in before.\nWritten: " in same.stdout
     Path("balls.py").write_text(BALLS.replace("radius=0.1", "radius=0.101"))
     moved = sweep(*words, "--out", "after", "--check", "before")
     lines = moved.stdout.splitlines()
@@ -93,14 +93,17 @@ def test_a_failure_that_was_not_recorded_has_moved():
     assert moved.returncode == 1
     assert "\n1 of 2 tasks have moved since before: task in 1.\n    apart=0.15, seed=1, fate=good" in moved.stdout
     more = sweep("--set", "seed=0", "--out", "after", "--check", "before")
-    assert more.returncode == 0 and "\nNot compared: 0 that were not recorded, 1 that are no more.\n" in more.stdout
+    assert (
+        more.returncode == 0
+        and "\nNot compared: 0 new tasks, 1 tasks that only the recorded sweep has.\n" in more.stdout
+    )
 
 
 def test_a_sweep_with_nothing_to_compare_is_refused_before_it_begins():
     assert sweep("--seeds", "2", "--out", "before").returncode == 0
     for words, sentence in (
-        (["--set", "seed=7", "--check", "before"], "--check before: it has none of the tasks of this sweep"),
-        (["--check", "nowhere"], "--check nowhere: there is no sweep in it"),
+        (["--set", "seed=7", "--check", "before"], "--check before: the folder has no task of this sweep"),
+        (["--check", "nowhere"], "--check nowhere: the folder has no sweep"),
         (["--check", "./runs"], "--check and --out are the same folder"),
     ):
         done = sweep(*words, "--out", "runs")
@@ -108,7 +111,10 @@ def test_a_sweep_with_nothing_to_compare_is_refused_before_it_begins():
     Path("expected").mkdir()
     Path("expected/balls.csv").write_text("# budget mass: relative 1 absolute 1\n")
     done = sweep("--seeds", "2", "--check", "before", "--out", "runs")
-    assert done.returncode == 2 and "expected/balls.csv has a budget of 'mass', which is none of volume" in done.stderr
+    assert (
+        done.returncode == 2
+        and "expected/balls.csv has a budget for 'mass', which must be one of volume" in done.stderr
+    )
     assert not Path("runs").exists()
 
 
@@ -132,7 +138,7 @@ def test_ctrl_c_ends_a_sweep_that_goes_on_later():
         process.send_signal(signal.SIGINT)
         said, complaints = process.communicate(timeout=60)
     assert (process.returncode, complaints) == (130, "")
-    assert "Interrupted; the same command goes on with what is missing.\n" in said
+    assert "Interrupted; the same command continues with the missing tasks.\n" in said
     assert 0 < len(parts("runs")) < 40 and "<h2>The worst tasks</h2>" in Path("runs/summary.html").read_text()
 
 
@@ -142,8 +148,8 @@ def test_ctrl_c_ends_a_sweep_that_goes_on_later():
         (["--grid", "mass=1"], "the scene balls has no parameter 'mass' (it has apart=0.15, seed=0, fate=good, "),
         (["--steps-kept", "some"], "--steps-kept must be summary, 'every N' or all, not 'some'"),
         (["--steps-kept", "every 0"], "--steps-kept must be summary, 'every N' or all, not 'every 0'"),
-        (["--address", "auto"], "--address is for --engine ray"),
-        (["--range", "apart=0:1"], "--range says what --sample draws, and there is no --sample"),
+        (["--address", "auto"], "--address needs --engine ray"),
+        (["--range", "apart=0:1"], "--range needs --sample"),
     ],
 )
 def test_invalid_sweeps_are_refused_in_one_sentence(arguments, sentence):
@@ -166,7 +172,7 @@ def test_a_sweep_without_finished_tasks_has_no_page():
     assert lines[0] == "balls: 0 of 1 tasks are done." and lines[1].startswith(
         "Failed: apart=0.15, seed=0, fate=raises"
     )
-    assert lines[2:] == ["Tracebacks: runs/failures.parquet; --retry does them again"]
+    assert lines[2:] == ["Tracebacks: runs/failures.parquet; --retry runs these tasks again"]
     assert not Path("runs/summary.html").exists()
 
 
@@ -217,7 +223,7 @@ def test_the_row_the_text_the_page_and_the_exit_code_say_what_a_task_left_out():
     told = json.loads(sweep(*words, "--out", "runs", "--json").stdout)
     assert (told["done"], told["there_before"], told["skipped"], told["diverged"]) == (0, 3, 1, 1)
     same = sweep(*words, "--out", "same", "--check", "runs")
-    assert same.returncode == 0 and "3 of 3 tasks are as in runs." in same.stdout
+    assert same.returncode == 0 and "All 3 tasks are as in runs." in same.stdout
     Path("balls.py").write_text(LOSSES.replace('lost == "a body"', "lost"))
     moved = sweep(*words, "--out", "after", "--check", "runs")
     assert moved.returncode == 1 and "2 of 3 tasks have moved since runs: diverged in 2" in moved.stdout

@@ -218,7 +218,9 @@ def test_ctrl_c_goes_to_the_script(catches):
     assert steps[0] == 1 and len(steps) >= steps[-1] - 1  # one may have been interrupted before anything was written
     assert {row["fcl"] for row in rows} == {"agree"}
     assert ("KeyboardInterrupt" in complaints) is not catches and "overlapper/" not in complaints
-    assert bool(re.search(r"^Interrupted after step \d+; what came before is kept\.$", complaints, re.M)) is not catches
+    assert (
+        bool(re.search(r"^Interrupted after step \d+; the steps before are kept\.$", complaints, re.M)) is not catches
+    )
 
 
 def test_two_clients_have_a_table_each():
@@ -277,7 +279,7 @@ def test_processes_that_load_pybullet_are_told():
     Path("child.py").write_text(CHILD)
     script("import subprocess\nsteps(3)\nsubprocess.run([sys.executable, 'child.py', *sys.argv[1:]], check=True)")
     done = watch("script.py")
-    words = "script.py started another process that loads pybullet: what is stepped there is not watched"
+    words = "script.py started another process that loads pybullet: steps in other processes are not watched"
     assert (done.returncode, done.stderr.splitlines()[-1]) == (2, f"overlapper: {words}")
     assert "Overlaps of script.py in 3 steps" in done.stderr
     done = watch("script.py", "other")
@@ -316,11 +318,12 @@ def test_bodies_are_named_by_the_command_and_options_of_ours_behind_the_script_a
     assert "table/link0" in done.stderr and "cup/link0" in done.stderr
     assert done.stderr.splitlines()[-2:] == [
         "overlapper: --name 9=duck: there is no body 9",
-        "overlapper: --out stands behind script.py, and was an argument of it: options of the watch stand before it",
+        "overlapper: --out stands after script.py and was an argument of the script: "
+        "options of overlapper watch stand before the script",
     ]
     for words, sentence in (
         (["--name", "cup=1"], "--name must be BODY=NAME, such as 3=duck, not 'cup=1'"),
-        (["--name", "1=cup", "--name", "1=duck"], "--name says 1 twice"),
+        (["--name", "1=cup", "--name", "1=duck"], "--name gives 1 twice"),
     ):
         done = watch(*words, "script.py")
         assert (done.returncode, done.stdout, done.stderr) == (2, "", f"overlapper: {sentence}\n")
@@ -371,8 +374,8 @@ def test_a_window_is_opened_only_on_request_and_a_missing_screen_is_reported():
     watched, plain = watch("script.py"), alone()
     assert watched.returncode == plain.returncode == 1
     words = (
-        "overlapper: script.py asks pybullet for a window, and there is no screen to show it on, so pybullet ends it: "
-        "--direct runs it without one\n"
+        "overlapper: script.py opens a window of pybullet, but there is no screen, so pybullet ends the script: "
+        "--direct runs it without a window\n"
     )
     assert words in watched.stderr
     direct = watch("--direct", "script.py")
@@ -445,7 +448,7 @@ def test_a_disk_that_is_full_ends_the_watch_and_not_the_script(end, code):
     done = watch("--out", "own.csv", "script.py")
     assert done.returncode == code
     words = r"overlapper: script.py was watched up to step (\d+): cannot write the results: File too large; "
-    (last,) = re.findall(words + r"what came before is in own\.unfinished\.csv\n", done.stderr)
+    (last,) = re.findall(words + r"the steps before are in own\.unfinished\.csv\n", done.stderr)
     steps = {row["step"] for row in read_table(Path("own.unfinished.csv"))}
     assert steps in (set(range(1, int(last))), set(range(1, int(last) + 1)))
     assert Path("own.csv").read_text() == "of yesterday"
@@ -466,7 +469,10 @@ def test_shapes_that_cannot_be_read_end_the_watch_and_not_the_script():
     script("import tempfile; tempfile.tempdir = '/no/such/folder'\nsteps(9); print('on it goes')")
     done = watch("script.py")
     assert (done.returncode, done.stdout) == (2, "on it goes\n")
-    assert re.fullmatch(r"overlapper: script.py was watched up to step 1: .* hand over its shapes.*\n", said(done))
+    assert re.fullmatch(
+        r"overlapper: script.py was watched up to step 1: .* cannot hand over its shapes, .* temporary file .*\n",
+        said(done),
+    )
 
 
 def test_the_module_is_the_command():

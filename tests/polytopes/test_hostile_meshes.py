@@ -85,7 +85,7 @@ def test_a_count_of_triangles_that_are_not_there_is_refused(written, tmp_path):
     path = tmp_path / "x.stl"
     path.write_bytes(written["stl"][:80] + struct.pack("<I", 2**32 - 1) + written["stl"][84:])
     count = (len(written["stl"]) - 84) // 50
-    assert refusal(path) == f"it counts 4,294,967,295 triangles, and has room for {count}"
+    assert refusal(path) == f"it states 4,294,967,295 triangles, but has room for {count}"
 
 
 @pytest.mark.parametrize("heading", ["format binary_little_endian 1.0", "format ascii 1.0"])
@@ -111,11 +111,11 @@ TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 
 def test_a_pipe_is_refused_as_a_mesh_and_as_a_file_that_a_mesh_needs(tmp_path):
     for name in ("pipe.obj", "pipe"):
         os.mkfifo(tmp_path / name)
-    assert refusal(tmp_path / "pipe.obj") == "it is a pipe or a device, and no file"
-    with pytest.raises(ValueError, match=r"is not a mesh that can be read: it is a pipe or a device, and no file$"):
+    assert refusal(tmp_path / "pipe.obj") == "it is a pipe or a device, not a file"
+    with pytest.raises(ValueError, match=r"is not a mesh that can be read: it is a pipe or a device, not a file$"):
         read_parts(tmp_path / "pipe.obj")
     (tmp_path / "x.gltf").write_text(json.dumps(scene(uri="pipe")))
-    assert refusal(tmp_path / "x.gltf") == "it needs 'pipe', and there is no such file beside it"
+    assert refusal(tmp_path / "x.gltf") == "it needs the file 'pipe' in the same folder, which does not exist"
     (tmp_path / "x.obj").write_text("mtllib pipe\nusemtl a\n" + TETRAHEDRON)
     assert read_hull(tmp_path / "x.obj").volume == pytest.approx(1 / 6)
 
@@ -191,11 +191,11 @@ def scene(count=4, nodes=1, **buffer):
 def test_a_scene_that_counts_numbers_that_are_nowhere_is_refused(tmp_path):
     text = json.dumps(scene(400_000_000)).encode()
     (tmp_path / "x.gltf").write_bytes(text)
-    assert refusal(tmp_path / "x.gltf") == f"it counts 400,000,000 numbers in {len(text)} bytes"
+    assert refusal(tmp_path / "x.gltf") == f"it states 400,000,000 numbers, but has {len(text)} bytes"
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", 48, 0x004E4942) + bytes(48)
     (tmp_path / "x.glb").write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
-    assert refusal(tmp_path / "x.glb").startswith("it counts 400,000,000 numbers in ")
+    assert refusal(tmp_path / "x.glb").startswith("it states 400,000,000 numbers, but has ")
 
 
 def test_a_chunk_that_is_longer_than_its_file_is_refused(written, tmp_path):
@@ -204,10 +204,10 @@ def test_a_chunk_that_is_longer_than_its_file_is_refused(written, tmp_path):
     room = len(whole) - 28 - first  # behind the two heads of the file, and those of two chunks
     struct.pack_into("<I", whole, 20 + first, 4_000_000_000)
     (tmp_path / "x.glb").write_bytes(whole)
-    assert refusal(tmp_path / "x.glb") == f"it has a chunk of 4,000,000,000 bytes, and room for {room}"
+    assert refusal(tmp_path / "x.glb") == f"it has a chunk of 4,000,000,000 bytes, but room for {room}"
     behind = struct.pack("<I4s", 4_000_000_000, b"BIN\0")  # behind the length that the file states
     (tmp_path / "x.glb").write_bytes(written["glb"] + behind)
-    assert refusal(tmp_path / "x.glb") == "it has a chunk of 4,000,000,000 bytes, and room for 0"
+    assert refusal(tmp_path / "x.glb") == "it has a chunk of 4,000,000,000 bytes, but room for 0"
 
 
 def test_numbers_in_a_file_beside_the_scene_are_there(tmp_path):
@@ -215,15 +215,15 @@ def test_numbers_in_a_file_beside_the_scene_are_there(tmp_path):
     (tmp_path / "x.gltf").write_text(json.dumps(scene(3, uri="x.bin")))
     with open(tmp_path / "x.bin", "ab") as file:
         file.write(bytes(5000))
-    assert "it counts" not in refusal(tmp_path / "x.gltf")  # three indices, which are all 0: no hull
+    assert "it states" not in refusal(tmp_path / "x.gltf")  # three indices, which are all 0: no hull
     (tmp_path / "x.gltf").write_text(json.dumps(scene(4000, uri="x.bin")))
-    assert "it counts" not in refusal(tmp_path / "x.gltf")
+    assert "it states" not in refusal(tmp_path / "x.gltf")
 
 
 def test_a_mesh_that_a_scene_shows_too_often_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(mesh_parser, "MOST_SHOWN", 1000)
     (tmp_path / "x.gltf").write_text(json.dumps(scene(nodes=126)))
-    with pytest.raises(ValueError, match=r"^it shows 1,008 corners and indices, which is more than 1,000$"):
+    with pytest.raises(ValueError, match=r"^it has 1,008 vertices and indices, more than 1,000$"):
         mesh_parser.hull(tmp_path / "x.gltf")
 
 
@@ -246,23 +246,23 @@ def test_a_package_that_shows_an_object_too_often_is_refused_soon(tmp_path):
         twice = f'<component objectid="{k - 1}"/>' * 2
         nested += f'<object id="{k}"><components>{twice}</components></object>'
     package(path, nested, '<item objectid="39"/>')
-    assert re.fullmatch(r"it shows [\d,]{15,} corners and indices, which is more than 30,000,000", refusal(path))
+    assert re.fullmatch(r"it has [\d,]{15,} vertices and indices, more than 30,000,000", refusal(path))
     round_about = '<object id="1"><components><component objectid="1"/></components></object>'
     package(path, round_about, '<item objectid="1"/>')
-    assert refusal(path) == "an object in it is made of itself"
+    assert refusal(path) == "an object in it contains itself"
     elsewhere = '<component objectid="7" p:path="/3D/big.model" xmlns:p="p"/>' * 1000
     package(
         path, f'<object id="1"><components>{elsewhere}</components></object>', '<item objectid="1"/>', big=" " * 10**6
     )
-    assert refusal(path).startswith("it shows 125,")
+    assert refusal(path).startswith("it has 125,")
 
 
 def test_compressed_files_are_refused_or_limited_in_size(tmp_path):
     for name in ("x.zip", "x.tar.gz", "x.stl.bz2"):
         (tmp_path / name).write_bytes(b"")
-        assert refusal(tmp_path / name) == "it is packed, and must be unpacked first"
+        assert refusal(tmp_path / name) == "it is compressed: decompress it first"
     with zipfile.ZipFile(tmp_path / "x.3mf", "w", zipfile.ZIP_DEFLATED) as packed:
         packed.writestr("3D/3dmodel.model", bytes(10_000_000))
-    assert refusal(tmp_path / "x.3mf") == "it unpacks to more than 100 times its size"
+    assert refusal(tmp_path / "x.3mf") == "it decompresses to more than 100 times its size"
     (tmp_path / "y.3mf").write_bytes(b"no zip")
     assert refusal(tmp_path / "y.3mf") == "File is not a zip file"

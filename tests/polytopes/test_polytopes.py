@@ -170,7 +170,7 @@ def test_a_query_of_another_shape_or_order_is_refused(file, url):
     points_table(file, [(part, *p) for part in ("a", "b", "a") for p in TETRAHEDRON.tolist()])
     with pytest.raises(ValueError, match="must return id, x, y and z, not x, y"):
         list(read_polytopes(url, "SELECT x, y FROM points"))
-    with pytest.raises(ValueError, match="must return the points of polytope a together: ORDER BY its id"):
+    with pytest.raises(ValueError, match="must return the points of polytope a together: add ORDER BY id"):
         list(read_polytopes(url, "SELECT * FROM points"))
     with pytest.raises(sqlalchemy.exc.OperationalError, match="no such table: polytopes"):
         list(read_polytopes(url))

@@ -16,7 +16,7 @@ BROKEN = {
         r"cannot be measured: physicsClientId \d+ is not connected to a physics server"
     ),
     "PAIRS = [('a', 'b')]\ndef build(client):\n    pass": (
-        "cannot be measured: pairs names 'a', which is no body or link in the simulation"
+        "cannot be measured: pairs names 'a', which is not a body or link in the simulation"
     ),
     "class Mute(Exception):\n    def __str__(self):\n        raise ValueError\ndef build(client):\n    raise Mute": (
         "cannot be built at line 8: Mute"
@@ -39,7 +39,7 @@ def test_whatever_a_scene_does_is_one_sentence(body, tmp_path):
 def test_a_plain_script_is_not_run_and_is_sent_to_watch(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text("raise RuntimeError('it runs')")
-    sentence = rf"^{path} is no scene, as it has no STEPS: overlapper watch {path} runs a script as it is$"
+    sentence = rf"^{path} is not a scene, because it has no STEPS: overlapper watch {path} runs it as a script$"
     with pytest.raises(SceneError, match=sentence):
         load_scene(path)
     path.write_text("from overlapper.scenes.scene import *\n")

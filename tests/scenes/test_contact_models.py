@@ -64,7 +64,7 @@ def test_an_unknown_contact_model_is_refused(scene):
     for each in ("'soft'", "{'mass': 1}"):
         with pytest.raises(SceneError, match=rf"cube\.py has CONTACT = {each}, {either}"):
             scene(f"CONTACT = {each}")
-    with pytest.raises(SceneError, match=r"cube\.py has an invalid CONTACT: stiffness must be a number Pa/m"):
+    with pytest.raises(SceneError, match=r"cube\.py has an invalid CONTACT: stiffness must be a number in Pa/m"):
         next(run(scene("CONTACT = {'stiffness': 0}")))
 
 
@@ -166,7 +166,7 @@ def test_an_expected_file_has_forces_with_their_budgets(recorded):
     assert {name: expected.budgets[name] for name in FORCE_BUDGETS} == FORCE_BUDGETS
     assert lying(expected.rows) == pytest.approx(LYING, abs=1e-6)
     verdict = examined(recorded, expected)
-    assert verdict.moves == [] and "where today's simulation puts and pushes them" in verdict.lines()[2]
+    assert verdict.moves == [] and "poses and forces of the simulation of today" in verdict.lines()[2]
 
 
 def test_a_changed_force_has_moved(recorded):

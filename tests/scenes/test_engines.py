@@ -132,9 +132,9 @@ def test_new_bodies_and_bodies_without_a_pose_are_noticed():
 
 
 def test_a_simulator_without_forces_says_so():
-    with pytest.raises(ValueError, match="takes no forces"):
+    with pytest.raises(ValueError, match="accepts no forces"):
         VolumetricContact(AnyBodies(World()))
-    with pytest.raises(SceneError, match=r"has an invalid CONTACT: .*takes no forces"):
+    with pytest.raises(SceneError, match=r"has an invalid CONTACT: .*accepts no forces"):
         next(run(load_scene("sinking.py"), contact="volumetric"))
 
 

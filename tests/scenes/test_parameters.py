@@ -67,15 +67,15 @@ def test_a_value_has_the_kind_of_its_default(balls):
 @pytest.mark.parametrize(
     ("text", "default", "words"),
     [
-        ("2.5", 1, "x must be a whole number of 64 bits, as its default 1 is, not '2.5'"),
-        ("nan", 1.0, "x must be a finite number, as its default 1.0 is, not 'nan'"),
-        ("inf", 1.0, "x must be a finite number, as its default 1.0 is, not 'inf'"),
-        ("", 1.0, "x must be a finite number, as its default 1.0 is, not ''"),
-        ("maybe", True, "x must be true or false, as its default True is, not 'maybe'"),
+        ("2.5", 1, "x must be a whole number of 64 bits like its default 1, not '2.5'"),
+        ("nan", 1.0, "x must be a finite number like its default 1.0, not 'nan'"),
+        ("inf", 1.0, "x must be a finite number like its default 1.0, not 'inf'"),
+        ("", 1.0, "x must be a finite number like its default 1.0, not ''"),
+        ("maybe", True, "x must be true or false like its default True, not 'maybe'"),
         (
             "9" * 19,
             1,
-            f"x must be a whole number of 64 bits, as its default 1 is, not '{'9' * 19}'",
+            f"x must be a whole number of 64 bits like its default 1, not '{'9' * 19}'",
         ),
     ],
 )
@@ -88,7 +88,7 @@ def test_a_value_of_another_kind_is_refused_by_name(text, default, words):
 def test_an_unknown_parameter_is_refused_with_the_nearest_name(balls):
     with pytest.raises(SceneError, match=r"^the scene balls has no parameter 'apar'; the nearest is 'apart' \(it has"):
         load_scene(balls, {"apar": "1"})
-    with pytest.raises(ValueError, match=r"^the scene plain has no parameters, and so no 'mass'$"):
+    with pytest.raises(ValueError, match=r"^the scene plain has no parameter 'mass': it has no parameters$"):
         values_of({"mass": "1"}, {}, "plain")
 
 
@@ -129,7 +129,7 @@ def test_an_expected_file_says_the_parameters_that_it_was_recorded_with(balls):
     [
         (["apart"], "--set must be NAME=VALUE, not 'apart'"),
         (["=1"], "--set must be NAME=VALUE, not '=1'"),
-        (["apart=1", "apart=2"], "--set says apart twice"),
+        (["apart=1", "apart=2"], "--set gives apart twice"),
     ],
 )
 def test_empty_and_repeated_settings_are_refused(settings, sentence):
@@ -138,11 +138,11 @@ def test_empty_and_repeated_settings_are_refused(settings, sentence):
 
 
 def test_a_table_is_viewed_with_its_own_parameters():
-    with pytest.raises(ValueError, match=r"^--set is for scenes, and t.csv is a table, which says its own parameters$"):
+    with pytest.raises(ValueError, match=r"^--set is for scenes, but t.csv is a table, which has its own parameters$"):
         play("t.csv", given={"count": "1"})
 
 
 def test_invalid_settings_are_refused_in_one_sentence():
     done = overlapper("run", "balls.py", "--set", "count=1.5")
-    sentence = "overlapper: count must be a whole number of 64 bits, as its default 2 is, not '1.5'\n"
+    sentence = "overlapper: count must be a whole number of 64 bits like its default 2, not '1.5'\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", sentence)

@@ -109,5 +109,5 @@ def test_fcl_supports_cones_and_agrees_with_the_arbiter(other):
 
 
 def test_no_volume_is_proved_by_pieces():
-    with pytest.raises(CertificateError, match=r"^no volume is proved of a cone, which is not made of balls and"):
+    with pytest.raises(CertificateError, match=r"^a cone has no certificate, because it is not made of balls and"):
         proved_bounds((placed(CONE), placed(Box([1, 1, 1]))), lambda bounds: True)

@@ -165,7 +165,7 @@ def test_bullet_does_not_respond_either_to_pairs_that_a_script_lets_collide(clie
 def test_a_client_is_within_one_contact_at_a_time(client):
     ground(client)
     bodies = Bodies(client)
-    told = f"^physicsClientId {client} is within a `with` of a VolumetricContact already$"
+    told = f"^physicsClientId {client} already has an active VolumetricContact: leave its `with` block first$"
     with VolumetricContact(bodies), pytest.raises(RuntimeError, match=told), VolumetricContact(bodies):
         pass
     with VolumetricContact(bodies) as contact:

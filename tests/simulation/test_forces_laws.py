@@ -317,8 +317,8 @@ def test_a_body_that_gets_within_another_is_pushed_as_it_was_last(client):
         p.resetBasePositionAndOrientation(small, [0.1, 0.2, 0.05], [0, 0, 0, 1], client)
         p.resetBaseVelocity(small, [0, 0, 0], [0, 0, 0], client)
         said = (
-            r"^box#0/link0 and box#1/link0 share a volume without a side to push to, as one lies within the other or "
-            r"goes through it; they are pushed as they were last$"
+            r"^box#0/link0 and box#1/link0 overlap without a direction of force, because one lies within the other or "
+            r"goes through it; the force keeps its last direction$"
         )
         with pytest.warns(NoDirectionWarning, match=said) as told:
             contact.step()
@@ -333,7 +333,7 @@ def test_a_body_that_is_within_another_from_the_first_is_pushed_the_shortest_way
     box(client, 0.5, mass=0)
     small = box(client, 0.1, position=(0.1, -0.3, 0.05))
     with VolumetricContact(Bodies(client)) as contact:
-        with pytest.warns(NoDirectionWarning, match="without a side to push to"):
+        with pytest.warns(NoDirectionWarning, match="without a direction of force"):
             contact.step()
         force = contact.on(small)[0]
         assert force == pytest.approx([0, -1e7 * 0.2**3, 0])

@@ -28,17 +28,17 @@ def resting(world, **options):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"stiffness": 0}, "stiffness must be a number Pa/m greater than 0, not 0"),
-        ({"stiffness": -1.0}, "stiffness must be a number Pa/m greater than 0, not -1.0"),
-        ({"stiffness": math.nan}, "stiffness must be a number Pa/m greater than 0, not nan"),
-        ({"stiffness": math.inf}, "stiffness must be a number Pa/m greater than 0, not inf"),
-        ({"stiffness": "hard"}, "stiffness must be a number Pa/m greater than 0, not 'hard'"),
-        ({"stiffness": "1e7"}, "stiffness must be a number Pa/m greater than 0, not '1e7'"),
-        ({"stiffness": None}, "stiffness must be a number Pa/m greater than 0, not None"),
-        ({"dissipation": -1e-3}, "dissipation must be a number s 0 or greater, not -0.001"),
-        ({"dissipation": [1]}, "dissipation must be a number s 0 or greater, not [1]"),
-        ({"friction": "foo"}, "friction must be a number 0 or greater, not 'foo'"),
-        ({"friction": -0.5}, "friction must be a number 0 or greater, not -0.5"),
+        ({"stiffness": 0}, "stiffness must be a number in Pa/m greater than 0, not 0"),
+        ({"stiffness": -1.0}, "stiffness must be a number in Pa/m greater than 0, not -1.0"),
+        ({"stiffness": math.nan}, "stiffness must be a number in Pa/m greater than 0, not nan"),
+        ({"stiffness": math.inf}, "stiffness must be a number in Pa/m greater than 0, not inf"),
+        ({"stiffness": "hard"}, "stiffness must be a number in Pa/m greater than 0, not 'hard'"),
+        ({"stiffness": "1e7"}, "stiffness must be a number in Pa/m greater than 0, not '1e7'"),
+        ({"stiffness": None}, "stiffness must be a number in Pa/m greater than 0, not None"),
+        ({"dissipation": -1e-3}, "dissipation must be a number in s 0 or greater, not -0.001"),
+        ({"dissipation": [1]}, "dissipation must be a number in s 0 or greater, not [1]"),
+        ({"friction": "foo"}, "friction must be a number 0 or greater, or 'distributed', not 'foo'"),
+        ({"friction": -0.5}, "friction must be a number 0 or greater, or 'distributed', not -0.5"),
         ({"substeps": 0}, "substeps must be a whole number from 1, or 'auto', not 0"),
         ({"substeps": 1.5}, "substeps must be a whole number from 1, or 'auto', not 1.5"),
         ({"substeps": True}, "substeps must be a whole number from 1, or 'auto', not True"),
@@ -69,8 +69,8 @@ def test_invalid_pairs_are_refused_at_once_in_the_words_of_bodies(world, pairs):
 @pytest.mark.parametrize(
     ("name", "given", "least"),
     [
-        ("stiffness", 0, "Pa/m greater than 0"),
-        ("dissipation", math.nan, "s 0 or greater"),
+        ("stiffness", 0, "in Pa/m greater than 0"),
+        ("dissipation", math.nan, "in s 0 or greater"),
         ("friction", "slippery", "0 or greater"),
     ],
 )
@@ -107,7 +107,7 @@ def test_a_function_gives_the_stiffness_of_each_pair(world):
 
 def test_a_step_outside_of_the_with_block_is_refused(world):
     contact = world.contact()
-    said = r"^step\(\) is for within `with contact:`, where Bullet does not respond to these pairs$"
+    said = r"^step\(\) must be called within `with contact:`, where Bullet does not push these pairs apart$"
     with pytest.raises(RuntimeError, match=said):
         contact.step()
     with contact:
@@ -119,8 +119,8 @@ def test_a_step_outside_of_the_with_block_is_refused(world):
 def test_too_few_substeps_are_reported_once_with_the_number_needed(world):
     resting(world)
     said = (
-        r"^1 substeps are too few for the stiffness between plane/link0 and box/link0, which swing at up to "
-        r"(\d+) rad/s: (\d+) would follow them; until then their contact loses energy$"
+        r"^1 substeps are too few for the stiffness between plane/link0 and box/link0, which oscillate at up to "
+        r"(\d+) rad/s: with fewer than (\d+) substeps, their contact loses energy$"
     )
     with world.contact(stiffness=1e9, substeps=1) as contact:
         with pytest.warns(SubstepsWarning, match=said) as told:

@@ -185,7 +185,7 @@ def test_heights_that_are_replaced_are_noticed(client, recorder):
 
 def test_a_field_that_no_recorder_has_noted_is_skipped_by_name(client):
     ground = field(client, rough())
-    with pytest.warns(SkippedShapeWarning, match="a height field is modelled only if a Recorder has noted"):
+    with pytest.warns(SkippedShapeWarning, match="a height field is modelled only if a Recorder noted"):
         bodies = Bodies(client)
     assert [(each.body, each.link) for each in bodies.skipped] == [(ground, -1)] and bodies.keys == []
 

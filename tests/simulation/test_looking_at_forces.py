@@ -67,7 +67,7 @@ def test_a_mean_force_without_direction_is_along_the_last_normal(client):
     rod = cube_at(client, 0, 0, 0.04)
     outer = box(client, 1, mass=0, position=[0, 0, 0.5])
     with VolumetricContact(Bodies(client), pairs=[(outer, rod)]) as contact:
-        with pytest.warns(UserWarning, match="without a side to push to"):
+        with pytest.warns(UserWarning, match="without a direction of force"):
             contact.step()
         seen = contact.mean()
     assert not seen.directed.any() and seen.normal == pytest.approx(contact.last.normal) and seen.force.any()

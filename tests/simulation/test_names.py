@@ -91,6 +91,6 @@ def test_a_given_name_is_used_everywhere(client):
 @pytest.mark.parametrize("names", [{"duck": 3}, {3: ""}, {3: None}, ["duck"], "duck"])
 def test_invalid_names_are_refused(client, names):
     with pytest.raises(
-        ValueError, match=r"^names must have names by the numbers of bodies, such as \{3: 'duck'\}, not"
+        ValueError, match=r"^names must be a dictionary of names by the numbers of bodies, such as \{3: 'duck'\}, not"
     ):
         Bodies(client, names=names)

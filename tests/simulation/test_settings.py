@@ -18,7 +18,7 @@ from overlapper.simulation.settings import Asking, Modelling
         (Asking, {"method": "best"}, "method must be one of 'auto', 'paper', not 'best'"),
         (Modelling, {"concave": "drop"}, "concave must be one of 'decompose', 'enclose', 'skip', not 'drop'"),
         (Modelling, {"surface": "rough"}, "surface must be one of 'nominal', 'margin', not 'rough'"),
-        (Modelling, {"concave_threshold": 2}, "the threshold of concavity must lie between 0.01 and 1, not 2"),
+        (Modelling, {"concave_threshold": 2}, "the concavity threshold must lie between 0.01 and 1, not 2"),
     ],
 )
 def test_an_invalid_setting_is_refused_in_one_sentence(kind, given, message):

@@ -66,7 +66,7 @@ def test_three_nodes_do_thousands_of_items_by_few_references_and_a_broken_instal
             assert sorted(number for number, _ in found) == [*range(9000)]
             assert len({outcome.value[2] for _, outcome in found}) == 3 and max(most) <= 6
             broken = Job("jobs", "doing", "x", gather="breaking")
-            with pytest.raises(NotStarted, match=r"^the cluster loses what it is given: "):
+            with pytest.raises(NotStarted, match=r"^the Ray cluster loses objects: "):
                 [*cluster.shares(broken, [("give", k) for k in range(9000)])]
         started.stdin.close()
 
@@ -158,7 +158,7 @@ def test_a_cluster_that_loses_every_task_is_refused(ray):
     ray.lost, ray.cpus = LOSSES + 1, 64_000.0
     with (
         closing(Cluster()) as cluster,
-        pytest.raises(NotStarted, match=r"^the cluster loses what it is given: "),
+        pytest.raises(NotStarted, match=r"^the Ray cluster loses objects: "),
     ):
         [*outcomes(cluster, Job("jobs", "doing", "x"), [("give", k) for k in range(5000)])]
     assert ray.cancelled and not ray.lost

@@ -69,7 +69,7 @@ def compared(check, runs, grids=GRIDS, expected=NOWHERE):
 
 def test_a_sweep_is_as_it_was_recorded(recorded):
     comparison = compared(recorded, recorded)
-    assert comparison.lines(10) == [f"8 of 8 tasks are as in {recorded}."]
+    assert comparison.lines(10) == [f"All 8 tasks are as in {recorded}."]
     assert not comparison.moved.size and comparison.counts == {}
 
 
@@ -210,12 +210,10 @@ def test_tasks_are_matched_by_the_parameters_that_both_have(recorded):
     swept("after", grids, steps=3)
     comparison = compared(recorded, "after", grids)
     assert comparison.lines(10) == [
-        f"4 of 4 tasks are as in {recorded}.",
-        "Not compared: 4 that were not recorded, 4 that are no more.",
+        f"All 4 tasks are as in {recorded}.",
+        "Not compared: 4 new tasks, 4 tasks that only the recorded sweep has.",
     ]
-    with pytest.raises(
-        ValueError, match=r": by the parameters of both, tasks of this sweep have the same apart, seed, "
-    ):
+    with pytest.raises(ValueError, match=r": two tasks of this sweep have the same apart, seed, "):
         compared(recorded, "after", [*grids, "colour=red,blue"])
 
 
@@ -226,9 +224,7 @@ def test_a_scene_without_parameters_is_compared(other):
     Path("balls.py").write_text(plain.replace("apart + 1e-3 * seed", "0.16"))
     swept("after", [])
     assert compared("before", "after", []).lines(1)[1].startswith("    the scene: ")
-    with pytest.raises(
-        ValueError, match=r"^--check other: by the parameters of both, tasks of the sweep in it have noth"
-    ):
+    with pytest.raises(ValueError, match=r"^--check other: two tasks of the recorded sweep cannot be told apart"):
         compared("other", "after", [])
 
 
@@ -246,7 +242,7 @@ def without(column):
 @pytest.mark.parametrize(
     ("spoil", "sentence"),
     [
-        (lambda: shutil.rmtree("other"), "there is no sweep in it"),
+        (lambda: shutil.rmtree("other"), "the folder has no sweep"),
         (lambda: spoiled("tasks.parquet"), "tasks.parquet cannot be read: .*[Pp]arquet"),
         (lambda: spoiled("failures.parquet"), "failures.parquet cannot be read: .*[Pp]arquet"),
         (lambda: without("task"), "tasks.parquet has no column 'task'"),
@@ -261,7 +257,7 @@ def test_a_folder_without_a_sweep_is_refused(spoil, sentence):
 
 
 def test_a_sweep_of_other_points_is_refused(recorded):
-    with pytest.raises(ValueError, match=r": it has none of the tasks of this sweep$"):
+    with pytest.raises(ValueError, match=r": the folder has no task of this sweep$"):
         Recorded(recorded, NOWHERE, sweep_of(["seed=7"]))
 
 
@@ -278,7 +274,7 @@ def test_the_page_has_a_map_of_where_it_has_moved():
         plain = page.write(sweep, store, "balls.py").read_text()
         text = page.write(sweep, store, "balls.py", comparison=comparison).read_text()
     assert "What has moved" not in plain
-    told = "<p>4 of 11 tasks have moved since other: largest_volume_m3 in 4. Not compared: 1 that were not recorded"
+    told = "<p>4 of 11 tasks have moved since other: largest_volume_m3 in 4. Not compared: 1 new tasks"
     assert told in text and text.count("<td>largest_volume_m3</td>") == 4
     # Lines over each of the three parameters, maps over each two.
     assert text.count("<svg") == plain.count("<svg") + 6 and "change of largest volume, cm³" in text

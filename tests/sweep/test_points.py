@@ -40,12 +40,12 @@ def test_a_grid_is_a_list_of_values_or_a_count_between_two_numbers(text, values)
         ("mas=1", "the scene grasp has no parameter 'mas'; the nearest is 'mass' (it has mass=1.0, count=3, seed=0, "),
         ("mass=1:2", "--grid mass=1:2 must be mass=FROM:TO:COUNT, mass=FROM:TO:COUNT:log or mass=A,B,..."),
         ("mass=1:2:3:4", "--grid mass=1:2:3:4 must be mass=FROM:TO:COUNT, mass=FROM:TO:COUNT:log or mass=A,B,..."),
-        ("mass=a:2:3", "--grid mass=a:2:3: mass must be a finite number, as its default 1.0 is, not 'a'"),
+        ("mass=a:2:3", "--grid mass=a:2:3: mass must be a finite number like its default 1.0, not 'a'"),
         ("mass=2:1:3", "--grid mass=2:1:3 must go from a number to a larger one, not from 2 to 1"),
         ("mass=0:1:3:log", "--grid mass=0:1:3:log must go from a number above 0 to a larger one, not from 0 to 1"),
         ("mass=1:2:0", "--grid mass=1:2:0: the count must be a whole number from 1 to 10,000,000, not '0'"),
         ("mass=1:2:1e9", "--grid mass=1:2:1e9: the count must be a whole number from 1 to 10,000,000, not '1e9'"),
-        ("soft=0:1:2", "soft must be true or false, as its default False is, not '0:1:2'"),
+        ("soft=0:1:2", "soft must be true or false like its default False, not '0:1:2'"),
     ],
 )
 def test_an_invalid_grid_is_refused_in_one_sentence(text, sentence):
@@ -77,7 +77,7 @@ def test_too_many_tasks_are_refused(monkeypatch):
 
 
 def test_seeds_are_for_scenes_that_have_one():
-    with pytest.raises(ValueError, match=r"^--seeds is for scenes with a parameter `seed`, a whole number; bare has"):
+    with pytest.raises(ValueError, match=r"^--seeds needs a scene with a parameter `seed`, a whole number; bare has"):
         Space("bare", {"seed": 1.0}).seeds(3)
 
 
@@ -96,9 +96,9 @@ def test_a_sample_is_a_latin_hypercube_of_its_ranges_and_the_same_again():
     ("ranges", "sentence"),
     [
         ([], "--sample needs a --range NAME=FROM:TO for each parameter that it draws"),
-        (["mass=1:2", "mass=1:3"], "--range says mass twice"),
-        (["mass=1:2:3"], "--range mass=1:2:3 must be mass=FROM:TO or mass=FROM:TO:log, of a number"),
-        (["kind=a:b"], "--range kind=a:b must be kind=FROM:TO or kind=FROM:TO:log, of a number"),
+        (["mass=1:2", "mass=1:3"], "--range gives mass twice"),
+        (["mass=1:2:3"], "--range mass=1:2:3 must be mass=FROM:TO or mass=FROM:TO:log, with two numbers"),
+        (["kind=a:b"], "--range kind=a:b must be kind=FROM:TO or kind=FROM:TO:log, with two numbers"),
         (["mass=2:1"], "--range mass=2:1 must go from a number to a larger one, not from 2 to 1"),
     ],
 )
@@ -117,11 +117,11 @@ def test_a_table_has_a_column_for_each_parameter(tmp_path):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", " must have the names of parameters in its first line, each once"),
-        ("mass,mass\n1,2\n", " must have the names of parameters in its first line, each once"),
+        ("", " must have the names of the parameters, each once, in its first line"),
+        ("mass,mass\n1,2\n", " must have the names of the parameters, each once, in its first line"),
         ("mass\n", " has no points"),
-        ("# why\nmass\n1,2\n", ", line 3: it has 2 cells and not 1"),
-        ("mass\nheavy\n", ", line 2: mass must be a finite number, as its default 1.0 is, not 'heavy'"),
+        ("# why\nmass\n1,2\n", ", line 3: it has 2 cells, not 1"),
+        ("mass\nheavy\n", ", line 2: mass must be a finite number like its default 1.0, not 'heavy'"),
         ("colour\n1\n", "the scene grasp has no parameter 'colour'"),
     ],
 )

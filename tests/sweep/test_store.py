@@ -171,13 +171,13 @@ def test_a_folder_of_an_earlier_version_is_left_alone(tmp_path):
     (tmp_path / "sweep.json").write_text(json.dumps(IDENTITY))
     (tmp_path / "tasks.parquet").mkdir()
     (tmp_path / "tasks.parquet" / f"{task(1).name}.parquet").write_bytes(b"of its only task")
-    with pytest.raises(ValueError, match=r"is of parts None, not named by digest: give another --out$"):
+    with pytest.raises(ValueError, match=r"has parts None, not named by digest: give another --out$"):
         Store(tmp_path, IDENTITY)
     assert len(files(tmp_path, TASKS)) == 1
 
 
 def test_two_sweeps_do_not_work_in_one_folder(tmp_path):
-    with Store(tmp_path, IDENTITY), pytest.raises(ValueError, match=rf"^another sweep is at work in {tmp_path}$"):
+    with Store(tmp_path, IDENTITY), pytest.raises(ValueError, match=rf"^another sweep is running in {tmp_path}$"):
         Store(tmp_path, IDENTITY)
     Store(tmp_path, IDENTITY).close()
 
@@ -185,9 +185,9 @@ def test_two_sweeps_do_not_work_in_one_folder(tmp_path):
 @pytest.mark.parametrize(
     ("other", "words"),
     [
-        ({"scene": "boxes"}, "is of scene balls, not boxes: give another --out"),
-        ({"steps": "4"}, "is of steps 3, not 4: give another --out"),
-        ({"overlapper": "2"}, "is of overlapper 1, not 2: give another --out"),
+        ({"scene": "boxes"}, "has scene balls, not boxes: give another --out"),
+        ({"steps": "4"}, "has steps 3, not 4: give another --out"),
+        ({"overlapper": "2"}, "has overlapper 1, not 2: give another --out"),
     ],
 )
 def test_a_folder_belongs_to_one_sweep(tmp_path, other, words):
@@ -200,7 +200,7 @@ def test_a_folder_belongs_to_one_sweep(tmp_path, other, words):
 def test_a_scene_file_that_has_changed_is_another_sweep(tmp_path):
     Store(tmp_path, IDENTITY).close()
     with pytest.raises(
-        ValueError, match=r"^the scene file is not that of the sweep in .* any more: give another --out$"
+        ValueError, match=r"^the scene file has changed since the sweep in .* began: give another --out$"
     ):
         Store(tmp_path, IDENTITY | {"scene file": "xyz"})
 
@@ -208,7 +208,9 @@ def test_a_scene_file_that_has_changed_is_another_sweep(tmp_path):
 @pytest.mark.parametrize("text", ["half", "7", '["a"]'])
 def test_a_folder_without_a_readable_description_is_refused(tmp_path, text):
     (tmp_path / "sweep.json").write_text(text)
-    with pytest.raises(ValueError, match=r"sweep.json does not say what is in .*: give another --out$"):
+    with pytest.raises(
+        ValueError, match=r"sweep.json is damaged, so the sweep in .* is not known: give another --out$"
+    ):
         Store(tmp_path, IDENTITY)
 
 
@@ -246,7 +248,9 @@ def test_equal_rows_are_equal_bytes_with_the_parameters_in_each():
     ("name", "table"), [("task", "tasks"), ("steps", "tasks"), ("bodyA", "steps"), ("what", "failures")]
 )
 def test_a_parameter_that_is_called_like_a_column_is_refused(name, table):
-    with pytest.raises(ValueError, match=rf"^the parameter '{name}' has the name of a column of the table of {table}$"):
+    with pytest.raises(
+        ValueError, match=rf"^the parameter '{name}' must not have the name of a column of the table {table}$"
+    ):
         must_be_no_columns({name: 1})
     must_be_no_columns({"mass": 1})
 

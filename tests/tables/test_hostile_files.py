@@ -84,7 +84,7 @@ def test_a_mutated_expected_file_is_read_or_refused_in_one_sentence(written, tmp
 def test_a_mutated_shape_is_read_or_refused_in_one_sentence(data):
     text = mutated(data, text_of(data.draw(st.sampled_from(SHAPES))).encode()).decode(errors="replace")
     said = said_by(lambda: shape_of(text))
-    assert said == "" or (" is no shape: " in said and "\n" not in said)
+    assert said == "" or (" is not a shape: " in said and "\n" not in said)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_a_mutated_shape_is_read_or_refused_in_one_sentence(data):
         ("[" * 100_000, "maximum recursion depth exceeded"),
         (
             json.dumps(["Hull", base64.b64encode(zlib.compress(bytes(60_000_000))).decode()]),
-            "its vertices are cut, or more",
+            "its vertices are cut off, or more",
         ),
         (
             json.dumps(["Hull", base64.b64encode(zlib.compress(CORNERS.tobytes())[:-9]).decode()]),
@@ -126,9 +126,9 @@ def sqlite_of_bytes(data):
         (
             "expected.csv",
             (b"budget volume: relative 1e-09", b"budget volume: relative 1\x1b\0"),
-            "two numbers from 0: 1",
+            "two numbers from 0 as budget of volume, not 1",
         ),
-        ("expected.csv", (b"budget volume", b"budget " + b"v" * 5000), "which is none of"),
+        ("expected.csv", (b"budget volume", b"budget " + b"v" * 5000), "which must be one of"),
         ("expected.csv", (b"\n1,0,-1,0,2,", b"\n3,0,-1,0,2,"), "are not all together"),
     ],
 )

@@ -115,13 +115,15 @@ def test_steps_and_times_are_counted_or_given(two_boxes, tmp_path):
         log.add(two_boxes.overlaps(), time=2.5)
         with pytest.raises(ValueError, match=r"^step must be larger from one add\(\) to the next: 12 came after 12$"):
             log.add(two_boxes.overlaps(), step=12)
-        with pytest.raises(ValueError, match=r"^time must be finite, not nan$"):
+        with pytest.raises(ValueError, match=r"^time must be a finite number of seconds, not nan$"):
             log.add(two_boxes.overlaps(), time=float("nan"))
     found = [(row["step"], row["time_s"]) for row in read_table(tmp_path / "own.csv")]
     assert found == [(1, 1 / 240), (10, 10 / 240), (11, 11 / 240), (12, 2.5)]
     assert log.steps == 12
     log.close()
-    with pytest.raises(ValueError, match=r"^this Log is closed: Contacts\(1, 1 of them overlapping\) came too late$"):
+    with pytest.raises(
+        ValueError, match=r"^this Log is closed, so Contacts\(1, 1 of them overlapping\) cannot be added$"
+    ):
         log.add(two_boxes.overlaps())
 
 
@@ -253,7 +255,9 @@ def test_a_log_has_the_forces_of_volumetric_contact_if_it_is_to_have_any(two_box
         log.add(contacts, forces=seen)
         log.add(contacts)
         without.add(contacts)
-        with pytest.raises(ValueError, match=r"^this Log has no columns of forces: say Log\(\.\.\., forces=True\)$"):
+        with pytest.raises(
+            ValueError, match=r"^this Log has no columns for forces: make it with Log\(\.\.\., forces=True\)$"
+        ):
             without.add(contacts, forces=seen)
     first, second = read_table(tmp_path / "run.csv")
     assert [first[f"force_{axis}_n"] for axis in "xyz"] == seen.force[0].tolist() and seen.force[0].any()

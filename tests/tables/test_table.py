@@ -230,7 +230,7 @@ def changed_table(path, change):
 
 def test_rows_missing_from_a_database_are_noticed(tmp_path):
     path = changed_table(tmp_path / "run.sqlite", "DELETE FROM overlaps WHERE bodyB = 2")
-    with pytest.raises(ValueError, match=r"is not as it was written: 2 of its 3 rows are there$"):
+    with pytest.raises(ValueError, match=r"has changed since it was written: it has 2 of its 3 rows$"):
         read_table(path)
 
 
@@ -286,7 +286,7 @@ def test_a_value_that_has_changed_is_noticed_whatever_holds_its_bits(tmp_path, e
         pyarrow.parquet.write_table(content, path)
     else:
         database(path, f"UPDATE metadata SET value = '{seal}' WHERE name = 'rows'")
-    with pytest.raises(ValueError, match=r"is not as it was written: a line of it is another$"):
+    with pytest.raises(ValueError, match=r"has changed since it was written: a line has changed$"):
         read_table(path)
 
 
@@ -357,10 +357,10 @@ def test_a_name_that_is_no_table_is_refused(tmp_path, text):
         (f"{','.join(NEEDED)}\n1{BLANK}\ntwo{BLANK}\n", r"cannot be read at line 3 below its heading: invalid literal"),
         (
             f"{','.join(NEEDED)}\n1{BLANK},7\n",
-            r"cannot be read at line 2 below its heading: it has 23 cells and not 22",
+            r"cannot be read at line 2 below its heading: it has 23 cells, not 22",
         ),
-        (f"{','.join(NEEDED)}\n{BLANK}\n", r"line 2 below its heading: a row is of no step"),
-        (f"{','.join(NEEDED)}\n{'9' * 30}{BLANK}\n", r"line 2 below its heading: step is beyond 64 bits"),
+        (f"{','.join(NEEDED)}\n{BLANK}\n", r"line 2 below its heading: a row has no step"),
+        (f"{','.join(NEEDED)}\n{'9' * 30}{BLANK}\n", r"line 2 below its heading: step does not fit into 64 bits"),
         (f"{','.join(NEEDED)}\n{'9' * 200_000}{BLANK}\n", r"line 2 below its heading: field larger than field limit"),
         (f"{','.join(NEEDED)},step\n", r"is not a table of overlaps: it has one twice"),
         ("step,volume_m3\n1,0.5\n", r"is not a table of overlaps: it has no column 'status'"),
@@ -385,7 +385,7 @@ COLUMN_LIST = ", ".join(NEEDED)
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda path: path.write_bytes(b"\xff" * 40), r"it is no text \("),
+        (lambda path: path.write_bytes(b"\xff" * 40), r"it is not text \("),
         (lambda path: path.with_suffix(".sqlite").write_bytes(b"\xff" * 4000), r"file is not a database$"),
         (lambda path: database(path.with_suffix(".sqlite"), "CREATE TABLE a (b)"), r"it has no table 'overlaps'$"),
         (
@@ -404,7 +404,7 @@ COLUMN_LIST = ", ".join(NEEDED)
                 "CREATE TABLE metadata (name, value)",
                 f"INSERT INTO overlaps VALUES ('one'{', NULL' * (len(NEEDED) - 1)})",
             ),
-            r"step is 'one', which is no int$",
+            r"step is 'one', which is not an int$",
         ),
         (
             lambda path: path.with_suffix(".parquet").write_bytes(b"PAR1" * 10),
@@ -414,7 +414,7 @@ COLUMN_LIST = ", ".join(NEEDED)
             lambda path: pyarrow.parquet.write_table(
                 pyarrow.table({"step": pyarrow.nulls(10_000_000, pyarrow.int32())}), path.with_suffix(".parquet")
             ),
-            r"it claims 10,000,000 rows in [\d,]+ bytes$",
+            r"it states 10,000,000 rows, but has [\d,]+ bytes$",
         ),
     ],
 )

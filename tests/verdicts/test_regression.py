@@ -71,7 +71,7 @@ def test_a_run_can_be_shorter_than_the_scene_or_show_some_steps_of_it(scene_file
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("STEPS = 0\ndef build(client): pass", "STEPS is 0"),
+        ("STEPS = 0\ndef build(client): pass", "a whole number from 1, not 0"),
         ("STEPS = 5", r"must have a function build\(client\)"),
         (
             "STEPS = 5\nPAIRS = 'some'\ndef build(client): pass",
@@ -80,7 +80,7 @@ def test_a_run_can_be_shorter_than_the_scene_or_show_some_steps_of_it(scene_file
         ("STEPS = 5\nNAMES = ['duck']\ndef build(client): pass", r"NAMES = \['duck'\], which must be a dictionary"),
         (
             "STEPS = 5\nNAMES = {}\ndef build(client): NAMES['duck'] = 1",
-            r"has invalid NAMES: names must have names by the numbers of bodies, such as .*, not 'duck': 1",
+            r"has invalid NAMES: names must be a dictionary of names by the numbers of bodies, such as .*: 1",
         ),
         ("STEPS = 5\ndef build(client:", "cannot be loaded at line 2: SyntaxError"),
         (
@@ -144,7 +144,7 @@ def test_a_first_recording_has_budgets_of_five_times_what_rounding_needs(recorde
     assert examined(recorded, read_expected(recorded.expected)).notes == []
     recorded.expected.write_text(text.replace("# budget volume: relative ", "# budget volume: relative 1"))
     (note,) = examined(recorded, read_expected(recorded.expected)).notes
-    assert "the budget of volume is " in note and "times what is needed" in note
+    assert "the budget of volume is " in note and "times as large as needed" in note
     expected = read_expected(recorded.expected)
     expected.budgets["volume"] = Budget(1e-20, 0.0)
     verdict = examined(recorded, expected)
@@ -195,18 +195,20 @@ def without_rows(text, kept):
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (lambda text: without_rows(text, 5), r"5 of its 8 rows are there"),
-        (lambda text: text[:-40], r"a line of it is another"),
-        (lambda text: text.replace(",overlapping,0", ",overlapping,9"), r"a line of it is another"),
-        (lambda text: text.replace('["Box", [0.5', '["Box", [0.6'), r"a line of it is another"),
-        (lambda text: without_rows(text, 0).partition("step,")[0], r"0 of its 8 rows are there"),
+        (lambda text: without_rows(text, 5), r"it has 5 of its 8 rows"),
+        (lambda text: text[:-40], r"a line has changed"),
+        (lambda text: text.replace(",overlapping,0", ",overlapping,9"), r"a line has changed"),
+        (lambda text: text.replace('["Box", [0.5', '["Box", [0.6'), r"a line has changed"),
+        (lambda text: without_rows(text, 0).partition("step,")[0], r"it has 0 of its 8 rows"),
     ],
 )
 def test_an_expected_file_that_was_cut_or_changed_is_refused(recorded, change, sentence):
     text = recorded.expected.read_text()
     assert change(text) != text
     recorded.expected.write_text(change(text))
-    with pytest.raises(ValueError, match=rf"two_cubes\.csv is not as it was written: {sentence} \(if that is as it"):
+    with pytest.raises(
+        ValueError, match=rf"two_cubes\.csv has changed since it was written: {sentence} \(to accept the change"
+    ):
         read_expected(recorded.expected)
 
 
@@ -268,19 +270,19 @@ def test_a_scene_shorter_than_its_recording_is_reported(recorded, scene_file):
         ("# steps: 1 3", "# steps: a b", "must say `# steps: <numbers>`"),
         ("# tolerance: 0.001", "# tolerance: 1e", "could not convert"),
         ("# tolerance: 0.001", "# tolerance: 1e9", "its tolerance must lie between 0 and 1, not 1000000000.0"),
-        ("# budget volume", "# budget weight", "has a budget of 'weight'"),
-        ("absolute 0.0001\n", "absolute -1\n", "has a budget of position that is not two numbers from 0: 0.0 and -1"),
-        ("absolute 0.0001\n", "absolute wide\n", "budget of position that is not two numbers from 0: 0.0 and wide"),
-        ("# shapes 0/-1/0", "# shapes 0/-1/one", "'0/-1/one' is no shape of a link of a body, as 0/-1/0 is one"),
-        ("# shapes", "# forms", "is in no line `# shapes`"),
-        ('["Box"', '["Bax"', "is no shape"),
+        ("# budget volume", "# budget weight", "has a budget for 'weight'"),
+        ("absolute 0.0001\n", "absolute -1\n", "must have two numbers from 0 as budget of position, not 0.0 and -1"),
+        ("absolute 0.0001\n", "absolute wide\n", "two numbers from 0 as budget of position, not 0.0 and wide"),
+        ("# shapes 0/-1/0", "# shapes 0/-1/one", "'0/-1/one' must be body/link/shape, such as 0/-1/0"),
+        ("# shapes", "# forms", "no line `# shapes` has the shape"),
+        ('["Box"', '["Bax"', "is not a shape"),
         (",overlapping,", ",overlapping,many", "cannot be read"),
     ],
 )
 def test_an_expected_file_that_cannot_be_read_is_named(recorded, old, new, sentence):
     text = recorded.expected.read_text()
     assert old in text
-    # Or the line says that another is not as it was written.
+    # Or the line says that another has changed since it was written.
     text = re.sub(r"^# rows: .*\n", "", text, flags=re.MULTILINE)
     recorded.expected.write_text(text.replace(old, new))
     with pytest.raises(ValueError, match=sentence) as refusal:
@@ -391,7 +393,7 @@ def loose(old, new):
 
 def test_a_budget_ten_times_too_wide_is_reported():
     assert loose([pair()], [pair(volume_m3=1 + 2e-10)]) == []
-    assert loose([pair()], [pair(volume_m3=1 + 5e-11)]) == ["the budget of volume is 20 times what is needed"]
+    assert loose([pair()], [pair(volume_m3=1 + 5e-11)]) == ["the budget of volume is 20 times as large as needed"]
 
 
 def test_no_difference_says_nothing_about_a_budget():

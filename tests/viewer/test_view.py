@@ -95,7 +95,7 @@ def test_a_table_is_distinguished_from_its_changed_scene(scene_file):
     scene_file.write_text(PRESS.replace("0.08 +", "0.07 +"))
     list((playback := play("press.csv", scene="press.py")).views)
     (remark,) = playback.remarks
-    assert re.match(r"what is seen is not what press\.csv has, as the simulation has changed: step \d, ", remark)
+    assert re.match(r"the steps shown differ from press\.csv, because the simulation has changed: step \d, ", remark)
 
 
 def test_a_longer_table_does_not_extend_the_run_of_a_scene(scene_file):
@@ -106,7 +106,7 @@ def test_a_longer_table_does_not_extend_the_run_of_a_scene(scene_file):
     Path("endless.csv").write_text(unsealed + last.replace("9,", "2000000000,", 1) + "\n")
     playback = play("endless.csv", scene="press.py")
     assert len(list(playback.views)) == playback.total == 12
-    assert playback.remarks == ["endless.csv goes on to step 2,000,000,000: --steps 2000000000 shows all of it"]
+    assert playback.remarks == ["endless.csv has 2,000,000,000 steps: --steps 2000000000 shows all of them"]
     scene_file.write_text(PRESS.replace("STEPS = 12", "STEPS = 5"))
     assert len(list(play("press.csv", scene="press.py").views)) == 5
     playback = play("press.csv", 20, "press.py")
@@ -138,26 +138,26 @@ def test_an_expected_file_is_viewed_without_its_scene(scene_file):
         (
             "lost.csv",
             {},
-            "lost.csv has no shapes to show: give the scene that it is of with --scene (it says '../lost')",
+            "lost.csv has no shapes to show: give its scene with --scene (it says '../lost')",
         ),
-        ("mute.csv", {}, "mute.csv has no shapes to show: give the scene that it is of with --scene"),
+        ("mute.csv", {}, "mute.csv has no shapes to show: give its scene with --scene"),
         (
             "odd.csv",
             {"scene": "press.py"},
             "odd.csv has an invalid setting: could not convert string to float: 'x'",
         ),
-        ("press.py", {"scene": "press.py"}, "--scene is for tables, and press.py is none"),
+        ("press.py", {"scene": "press.py"}, "--scene is for tables, but press.py is not a table"),
         ("press.py", {"live": True, "host": "192.0.2.1"}, "host must be an address of this machine, not '192.0.2.1': "),
         ("press.py", {"live": True, "host": "no host"}, "host must be an address of this machine, not 'no host': "),
         ("gone.csv", {}, "gone.csv: No such file"),
-        ("press.py", {"png": Path("a.png"), "step": 13}, "there is no step 13 to see"),
+        ("press.py", {"png": Path("a.png"), "step": 13}, "there is no step 13 to show"),
         (
             "press.py",
             {"overlaps": "faces,corners"},
             "--overlaps must name some of faces,edges,vertices,marks,forces, not 'c",
         ),
         ("press.py", {"bodies_back": "red"}, "--bodies-back must be a colour like #e69f00, not 'red'"),
-        ("press.py", {"live": True, "png": Path("a.png")}, "--html, --png and --live do not go together"),
+        ("press.py", {"live": True, "png": Path("a.png")}, "--html, --png and --live exclude each other"),
     ],
 )
 def test_files_that_cannot_be_viewed_are_refused_in_one_sentence(source, options, sentence, tmp_path):
@@ -237,7 +237,7 @@ def test_a_ball_in_the_ground_is_pictured_with_the_plane_around_it(tmp_path):
 
 
 def test_a_playback_without_views_has_nothing_to_see():
-    with pytest.raises(ValueError, match=r"^there is nothing to see: no step was simulated or recorded$"):
+    with pytest.raises(ValueError, match=r"^there is nothing to show: no step was simulated or recorded$"):
         largest(iter(()))
 
 

@@ -133,7 +133,7 @@ class DepthSearch {
 
 Penetration penetration(const Placed& a, const Placed& b) {
   if (!bounded(a.shape) && !bounded(b.shape))
-    throw std::invalid_argument("two half-spaces have no least translation that separates them");
+    throw std::invalid_argument("no translation separates two half-spaces: one of a and b must be bounded");
   if (!bounded(a.shape) || !bounded(b.shape)) {
     const Distance height = distance(a, b);
     return {-height.distance, height.normal};

@@ -204,7 +204,7 @@ void settle_half_spaces(std::span<const Placed> bodies, std::span<const OwnedPla
     }
   }
   if (!bound_a_set(bodies))
-    throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
+    throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone do not bound it");
   if (search.status == Status::kSeparated)
     throw std::invalid_argument("shapes must meet near their planes: half-spaces alone meet too far away");
 }

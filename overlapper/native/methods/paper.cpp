@@ -54,7 +54,7 @@ Hull stand_in(const Plane& plane, std::span<const Placed> bodies) {
     const Bounds box = bounds(body);
     reach = std::max(reach, norm(max(abs(box.lower), abs(box.upper))));
   }
-  if (reach == 0) throw std::invalid_argument("shapes must have a bounded one among them for method 'paper'");
+  if (reach == 0) throw std::invalid_argument("shapes must include a bounded shape for method 'paper'");
   const Vec3 n = plane.normal, u = any_orthogonal(n), v = cross(n, u);
   // A plane farther away cuts off all or nothing, and the cube would be a needle.
   const double offset = std::clamp(plane.offset, -2 * reach, 2 * reach), depth = std::max(0.0, reach + offset);

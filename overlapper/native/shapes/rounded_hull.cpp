@@ -96,7 +96,7 @@ Steiner steiner(const HullData& hull) {
 RoundedHull make_rounded_hull(std::span<const Vec3> points, double radius) {
   RoundedHull rounded{make_hull(points), Sphere::make(radius).radius};
   if (rounded.core.data->edges.empty())
-    throw std::invalid_argument("vertices are so close to flat that rounding leaves no ridges to round off");
+    throw std::invalid_argument("vertices must not be so flat that rounding errors leave no edges");
   return rounded;
 }
 

@@ -101,6 +101,8 @@ class Bodies(AnyBodies):
     ) -> None:
         if not isinstance(physicsClientId, int | np.integer):
             raise TypeError(f"physicsClientId must be what pybullet.connect() returned, not {physicsClientId!r}")
+        if not (recorder is None or isinstance(recorder, Recorder)):
+            raise TypeError(f"recorder must be a Recorder, not {recorder!r}")
         if recorder and recorder.physicsClientId != physicsClientId:
             raise ValueError(f"recorder is of client {recorder.physicsClientId}, not of {physicsClientId}")
         self.physicsClientId = physicsClientId

@@ -185,7 +185,7 @@ class BulletFile:
             kind, figures = self._figures(kind, address)
             self._room -= figures.nbytes + 1
             if self._room < 0:
-                raise ValueError("path is a damaged .bullet file: its shapes are made of each other without end")
+                raise ValueError("path is a damaged .bullet file: a shape contains itself")
             convex = self._base(address, "btConvexInternalShapeData") if kind == "hull" else None
             # The shortest decimal of the single-precision number is the double that Bullet has rounded.
             margin = float(str(convex["m_collisionMargin"])) if convex is not None else 0.0
@@ -258,7 +258,7 @@ def _damage() -> Iterator[None]:
         with np.errstate(over="ignore", invalid="ignore"):
             yield
     except MemoryError as error:
-        raise ValueError("path is a .bullet file that is damaged, or describes more than fits into memory") from error
+        raise ValueError("path is a damaged .bullet file, or needs more memory than there is") from error
     except (ValueError, *causes) as error:
         if str(error).startswith("path "):
             raise
@@ -290,7 +290,7 @@ def _blocks(data: bytes) -> list[Block]:
         code, size, address, layout, length = struct.unpack_from("<4siQii", data, start)
         blocks.append(Block(code.rstrip(b"\0").decode(), size, address, layout, length, start + 24))
         if blocks[-1].code != "DNA1" and (size < 0 or length < 0 or layout < 0):
-            raise ValueError("path is a damaged .bullet file: a block of it has a negative size")
+            raise ValueError("path is a damaged .bullet file: one of its blocks has a negative size")
         start += 24 + size
     return blocks
 

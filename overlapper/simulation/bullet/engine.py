@@ -7,6 +7,8 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from overlapper.simulation import Bodies, Recorder
 from overlapper.simulation.bullet import calls
 from overlapper.simulation.bullet.stepping import time_step
@@ -22,6 +24,8 @@ class Client:
     """See `Simulation`."""
 
     def __init__(self, client: int, recorder: Recorder | None = None) -> None:
+        if not isinstance(client, (int, np.integer)):
+            raise TypeError(f"physicsClientId must be what pybullet.connect() returned, not {client!r}")
         if not pybullet.isConnected(client):
             raise ValueError(f"physicsClientId {client} is not connected to a physics server")
         self._client = client

@@ -45,7 +45,7 @@ def kinematic_tree(path: Path, root: Element, modelling: Modelling) -> Generator
     from overlapper.simulation.bullet.recorder import Recorder
 
     if (count := len(root.findall("link"))) > MOST_LINKS:
-        raise NotRead(f"it has {count:,} links, and pybullet tells the poses of {MOST_LINKS} at most")
+        raise NotRead(f"it has {count:,} links, but pybullet returns the poses of at most {MOST_LINKS}")
     must_be_sound(path, root)
     client = pybullet.connect(pybullet.DIRECT)
     with Recorder(client) as recorder:
@@ -90,7 +90,7 @@ def _joints(client: int, id: int, name: str) -> list[Joint]:
         base = pybullet.getBasePositionAndOrientation(id, client)
         states = pybullet.getLinkStates(id, range(len(told)), computeForwardKinematics=1, physicsClientId=client)
     except pybullet.error as error:
-        raise NotRead(f"pybullet tells no poses of the {1 + len(told)} links of {name}") from error
+        raise NotRead(f"pybullet returns no poses for the {1 + len(told)} links of {name}") from error
     frames = [tuple(map(np.array, each[:2])) for each in (base, *(states or ()))]
     root = Joint("", "held", frames[0][0], frames[0][1], np.zeros(3), np.zeros(3), 0.0, -1.0)
     return [root, *(joint_between(client, id, each, frames[1 + each[16]], frames[1 + each[0]]) for each in told)]

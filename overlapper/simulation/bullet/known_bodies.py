@@ -68,7 +68,7 @@ class KnownBodies:
         if not self.unidentified:
             return []
         number = "1 body" if self.unidentified == 1 else f"{self.unidentified} bodies"
-        reason = "pybullet gives no id to what loadBullet brings, nor to links of robots in maximal coordinates"
+        reason = "pybullet gives no id to bodies from loadBullet, nor to links of robots in maximal coordinates"
         return [Skipped(-1, BASE, number, reason)]
 
     def _margins_changed(self) -> bool:

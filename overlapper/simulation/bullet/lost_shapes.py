@@ -96,7 +96,7 @@ def _reason(expected: Sequence[str], pieces: Sequence[int], files: Sequence[str]
     lost = [shape for shape, count in zip(expected, pieces) if not count] if len(pieces) == len(expected) else []
     lost = lost or [shape for shape in expected if files is not None and not _is_among(shape, files)] or [*expected]
     names = ", ".join(dict.fromkeys(map(printable, lost)))
-    return f"pybullet has built {there} of the {len(expected)} shapes that the file names, and not {names}"
+    return f"pybullet built {there} of the {len(expected)} shapes in the file, without {names}"
 
 
 def _is_among(shape: str, files: Sequence[str]) -> bool:

@@ -35,7 +35,7 @@ def read_apart(
     if find_spec("pybullet") is None:
         raise ImportError(f"overlapper.simulation needs {simulator_hint()}")
     if path.suffix.lower() not in endings:
-        raise NotRead(f"the name must end in {', '.join(endings)}, and {path.name!r} does not")
+        raise NotRead(f"the name must end in {', '.join(endings)}, not {path.name!r}")
     if not path.is_file():
         raise NotRead(f"there is no file {path}")
     try:
@@ -50,7 +50,7 @@ def read_apart(
         if out_of_memory(ended):
             raise NotRead(f"{path} cannot be read: pybullet needs more than {MEGABYTES:,} MB") from None
         if ended.code is not None and ended.code < 0:
-            raise NotRead(f"pybullet dies of {path} with signal {signal.Signals(-ended.code).name}") from None
+            raise NotRead(f"pybullet crashes on {path} with signal {signal.Signals(-ended.code).name}") from None
         if not ended.words:
             raise NotRead(f"{path} cannot be read: the process that reads it {ended}") from None
         raise RuntimeError(f"the process that reads {path} {ended}:\n{ended.words}") from None

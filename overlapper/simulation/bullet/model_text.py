@@ -47,7 +47,7 @@ def root_of(path: Path) -> Element:
     try:
         return ElementTree.fromstring(text[: text.index(end) + len(end)] if urdf else text)
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # pybullet may accept it
-        raise NotRead(f"it is no XML: {first_line(error)}") from error
+        raise NotRead(f"it is not XML: {first_line(error)}") from error
 
 
 def _must_not_be_broken(text: bytes) -> None:
@@ -56,7 +56,7 @@ def _must_not_be_broken(text: bytes) -> None:
         for place in range(LINE, len(line), LINE):
             around = line[place - 1 : place + 1]
             if not (around[:1] == b">" or around[1:] == b"<" or any(byte in b" \t\r" for byte in around)):
-                raise NotRead(f"pybullet breaks its lines after {LINE:,} bytes, and would break a word or a number")
+                raise NotRead(f"pybullet breaks lines after {LINE:,} bytes, which would break a word or a number")
 
 
 def must_be_sound(path: Path, root: Element) -> None:
@@ -70,7 +70,7 @@ def must_be_sound(path: Path, root: Element) -> None:
         _must_be_a_file(path, name)
     ending = path.suffix.lower()
     if ending == ".xml" and (changed := misread(root)):
-        raise NotRead(f"pybullet's importer of MJCF would change what it says: {changed}")
+        raise NotRead(f"pybullet would read the MJCF file wrongly: {changed}")
     if ending == ".sdf" and (included := root.find(".//include")) is not None:
         what = (included.findtext("uri") or "another file").strip()
         raise NotRead(f"it has <include> of {printable(what)}, which pybullet drops")
@@ -99,15 +99,15 @@ def _must_be_a_file(model: Path, name: str) -> None:
     if file is None:
         return
     if not file.is_file():
-        raise NotRead(f"it names {name!r}, which is a pipe, a device or a folder, and no file")
+        raise NotRead(f"it names {name!r}, which is a pipe, a device or a folder, not a file")
     if file.suffix.lower() == ".obj":
         text = file.read_bytes()
         if NO_NUMBER.search(text):
-            raise NotRead(f"it names {name!r}, which has corners that are no numbers")
+            raise NotRead(f"it names {name!r}, which has vertices that are not numbers")
         for each in LIBRARY.findall(text):
             library = file.parent / each.decode(errors="replace").strip()
             if library.exists() and not library.is_file():
-                raise NotRead(f"it names {name!r}, which names {library.name!r}, which is no file")
+                raise NotRead(f"it names {name!r}, and that file names {library.name!r}, which is not a file")
 
 
 def found(model: Path, name: str) -> Path | None:
@@ -139,7 +139,7 @@ def _must_have_numbers(owner: str, element: Element, tags: set[str]) -> None:
                 continue
             values = numbers(text)
             if not all(isinstance(value, float) and math.isfinite(value) for value in values):
-                raise NotRead(f"{owner} has <{part.tag} {name}={text!r}>, which is no number")
+                raise NotRead(f"{owner} has <{part.tag} {name}={text!r}>, which is not a number")
             if part.tag == "axis" and not any(values):
                 raise NotRead(f"{owner} has the axis {text!r}, which has no direction")
 

@@ -65,6 +65,8 @@ class Recorder:
     """
 
     def __init__(self, physicsClientId: int = 0) -> None:
+        if not isinstance(physicsClientId, int | np.integer):
+            raise TypeError(f"physicsClientId must be what pybullet.connect() returned, not {physicsClientId!r}")
         self.physicsClientId = physicsClientId
         self.changes = 0
         """How often anything was noted."""

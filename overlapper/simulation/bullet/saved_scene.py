@@ -65,8 +65,8 @@ def save(client: int) -> BulletFile:
         os.close(descriptor)
     except OSError as error:
         raise Unreadable(
-            f"the physics server of physicsClientId {client} cannot hand over its shapes, as there can be no temporary "
-            f"file: {error.strerror}"
+            f"the physics server of physicsClientId {client} cannot hand over its shapes, because no temporary "
+            f"file can be made: {error.strerror}"
         ) from error
     try:
         pybullet.saveBullet(name, physicsClientId=client)
@@ -78,8 +78,8 @@ def save(client: int) -> BulletFile:
     finally:
         os.unlink(name)
     raise Unreadable(
-        f"the physics server of physicsClientId {client} could not hand over its shapes in {name}: "
-        "it must run on this machine, be allowed to write there and have room for them"
+        f"the physics server of physicsClientId {client} could not write its shapes to {name}: "
+        "it must run on this machine, have the right to write there and have room on the disk"
         + (f" ({first_line(reason)})" if isinstance(reason, ValueError) else "")
     ) from reason
 

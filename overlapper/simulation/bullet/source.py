@@ -83,8 +83,8 @@ class BulletSource(Source):
                 self._told[id] = body
                 a, b = (body.link_names[link] for link in links)
                 yield SelfCollisionWarning(
-                    f"{body.name} (body {id}) collides with itself, its {a} with its {b}, and pairs within it are not "
-                    "looked at: set up a Recorder before the body is loaded and give it to Bodies(), or ask for "
+                    f"{body.name} (body {id}) collides with itself ({a} with {b}), but its own pairs are not measured: "
+                    "set up a Recorder before the body is loaded and give it to Bodies(), or ask for "
                     f"pairs=[({id}, {id})]"
                 )
 

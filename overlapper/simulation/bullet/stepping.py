@@ -43,7 +43,9 @@ class Stepping:
 
     def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
         if self._client in _INSIDE:
-            raise RuntimeError(f"physicsClientId {self._client} is within a `with` of a VolumetricContact already")
+            raise RuntimeError(
+                f"physicsClientId {self._client} already has an active VolumetricContact: leave its `with` block first"
+            )
         _INSIDE[self._client] = self
         self.turn_off(pairs)
         if not self._recorder:

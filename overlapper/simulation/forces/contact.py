@@ -152,7 +152,9 @@ class VolumetricContact:
             Outside of the `with`, because Bullet would push the bodies apart as well.
         """
         if not self._inside:
-            raise RuntimeError("step() is for within `with contact:`, where Bullet does not respond to these pairs")
+            raise RuntimeError(
+                "step() must be called within `with contact:`, where Bullet does not push these pairs apart"
+            )
         duration = self.bodies.time_step
         self._refresh()
         left, taken = duration, 0

@@ -49,7 +49,7 @@ class Parameter:
     """A number for all pairs of links, or one number for each pair."""
 
     def __init__(self, name: str, given: float | OfPair, unit: str, positive: bool = False) -> None:
-        self._name, self._unit, self._positive = name, f" {unit}" if unit else "", positive
+        self._name, self._unit, self._positive = name, f" in {unit}" if unit else "", positive
         self._function = given if callable(given) else None
         self._number = 0.0 if callable(given) else self._checked(given, "")
         self._known: dict[tuple[int, int], float] = {}
@@ -73,10 +73,11 @@ class Parameter:
 
     def _checked(self, given: Any, of: str) -> float:
         least = "greater than 0" if self._positive else "0 or greater"
+        others = ", or 'distributed'" if self._name == "friction" and not of else ""
         try:
             number = float(given)
         except (TypeError, ValueError):
             number = math.nan
         if isinstance(given, str) or not (number > 0 or (number == 0 and not self._positive)) or math.isinf(number):
-            raise ValueError(f"{self._name}{of} must be a number{self._unit} {least}, not {given!r}")
+            raise ValueError(f"{self._name}{of} must be a number{self._unit} {least}{others}, not {given!r}")
         return number

@@ -34,8 +34,8 @@ class Told:
             frequency = math.sqrt(frequency2[row])
             needed = math.ceil(frequency * duration * max(1, substeps))
             warnings.warn(
-                f"{substeps} substeps are too few for the stiffness between {a} and {b}, which swing at up to "
-                f"{frequency:.0f} rad/s: {needed} would follow them; until then their contact loses energy",
+                f"{substeps} substeps are too few for the stiffness between {a} and {b}, which oscillate at up to "
+                f"{frequency:.0f} rad/s: with fewer than {needed} substeps, their contact loses energy",
                 SubstepsWarning,
                 stacklevel=4,
             )
@@ -44,8 +44,8 @@ class Told:
         """Warn of the rows that have `lost` their direction."""
         for _, a, b in self._new(NoDirectionWarning, contacts, lost):
             warnings.warn(
-                f"{a} and {b} share a volume without a side to push to, as one lies within the other "
-                "or goes through it; they are pushed as they were last",
+                f"{a} and {b} overlap without a direction of force, because one lies within the other "
+                "or goes through it; the force keeps its last direction",
                 NoDirectionWarning,
                 stacklevel=4,
             )
@@ -56,8 +56,8 @@ class Told:
             self._lost.add(body)
             link, name = next((link, name) for (id, link), name in sorted(self._bodies.names.items()) if id == body)
             warnings.warn(
-                f"{name} (body {body}, link {link}) has no contacts: its velocity is not finite, as the simulation has "
-                "diverged",
+                f"{name} (body {body}, link {link}) has no contacts, because its velocity is not finite: "
+                "the simulation has diverged",
                 SkippedShapeWarning,
                 stacklevel=4,
             )

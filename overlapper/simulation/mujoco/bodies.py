@@ -78,7 +78,7 @@ class Bodies(AnyBodies):
         if data.model is not model:
             raise ValueError("data is of another model: make it with mujoco.MjData(model)")
         if surface != "nominal":
-            raise ValueError(f"surface must be 'nominal', not {surface!r}: MuJoCo collides no others")
+            raise ValueError(f"surface must be 'nominal', not {surface!r}: MuJoCo has no other surface")
         Modelling(concave, concave_threshold, surface)  # raises for invalid values
         self.model, self.data = model, data
         given = named(names)

@@ -25,7 +25,7 @@ TYPES = {
 
 NOT_MODELLED = {
     "hfield": "height fields are not modelled",
-    "sdf": "an SDF plugin computes its surface, which Python cannot read",
+    "sdf": "its surface comes from an SDF plugin, which Python cannot read",
 }
 ORIGIN, UNTURNED = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
 

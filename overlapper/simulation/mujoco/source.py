@@ -74,7 +74,7 @@ class MujocoSource(Source):
         """The flexes, which are not rigid."""
         kind = mujoco.mjtObj.mjOBJ_FLEX
         names = (mujoco.mj_id2name(self._model, kind, k) or f"flex {k}" for k in range(self._model.nflex))
-        return [Skipped(-1, -1, name, "flexes are deformable, and not modelled") for name in names]
+        return [Skipped(-1, -1, name, "flexes are deformable bodies, which are not modelled") for name in names]
 
     @property
     def unidentified(self) -> int:
@@ -85,6 +85,6 @@ class MujocoSource(Source):
         if not self._filter_told and mujoco.get_mjcb_contactfilter() is not None:
             self._filter_told = True
             yield UserWarning(
-                "a contact filter is set (mujoco.set_mjcb_contactfilter), and MuJoCo asks it instead of masks: "
-                "give its pairs to overlaps(pairs=...)"
+                "mujoco.set_mjcb_contactfilter set a contact filter, so the masks do not decide which pairs collide: "
+                "give the pairs with overlaps(pairs=...)"
             )

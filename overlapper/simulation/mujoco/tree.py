@@ -124,7 +124,7 @@ def _equalities(model: Any) -> tuple[dict[str, Mimic], tuple[str, ...]]:
             mimics[told[0]] = told[1]
         else:
             kind = str(mujoco.mjtEq(model.eq_type[k])).partition("mjEQ_")[2].lower()
-            notes.append(f"An <equality> of kind {kind} is not read: what it ties moves freely.")
+            notes.append(f"An <equality> of kind {kind} is not read: what it couples moves freely.")
     notes += _limits_of_balls(model)
     return mimics, tuple(dict.fromkeys(notes))
 

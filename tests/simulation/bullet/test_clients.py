@@ -86,7 +86,7 @@ def test_a_simulation_in_another_process_is_read():
 def test_a_server_that_writes_elsewhere_is_an_error_of_one_sentence(client, monkeypatch):
     box(client)
     monkeypatch.setattr(p, "saveBullet", lambda *args, **kwargs: None)
-    with pytest.raises(RuntimeError, match=f"physicsClientId {client} could not hand over its shapes"):
+    with pytest.raises(RuntimeError, match=f"physicsClientId {client} could not write its shapes"):
         Bodies(client)
 
 
@@ -97,7 +97,7 @@ def test_a_server_that_cannot_write_is_an_error_of_one_sentence(client, monkeypa
         raise p.error("no")
 
     monkeypatch.setattr(p, "saveBullet", refuse)
-    with pytest.raises(RuntimeError, match=f"physicsClientId {client} could not hand over its shapes") as caught:
+    with pytest.raises(RuntimeError, match=f"physicsClientId {client} could not write its shapes") as caught:
         Bodies(client)
     assert isinstance(caught.value.__cause__, p.error)
 
@@ -111,14 +111,16 @@ def test_a_file_that_is_cut_as_on_a_full_disk_is_an_error_of_one_sentence(client
         os.truncate(name, os.path.getsize(name) // 2)
 
     monkeypatch.setattr(p, "saveBullet", cut)
-    with pytest.raises(RuntimeError, match=r"and have room for them \(path is a [^\n]*\)$"):
+    with pytest.raises(RuntimeError, match=r"and have room on the disk \(path is a [^\n]*\)$"):
         Bodies(client)
 
 
 def test_without_a_temporary_folder_the_error_is_one_sentence(client, monkeypatch):
     box(client)
     monkeypatch.setattr("tempfile.tempdir", "/no/such/folder")
-    with pytest.raises(RuntimeError, match=r"cannot hand over its shapes, as there can be no temporary file: No such"):
+    with pytest.raises(
+        RuntimeError, match=r"cannot hand over its shapes, because no temporary file can be made: No such"
+    ):
         Bodies(client)
 
 
@@ -127,7 +129,7 @@ def test_no_file_is_left_behind(client, tmp_path, monkeypatch):
     box(client)
     Bodies(client)
     monkeypatch.setattr(p, "saveBullet", lambda *args, **kwargs: None)
-    with pytest.raises(RuntimeError, match="hand over"):
+    with pytest.raises(RuntimeError, match="could not write its shapes"):
         Bodies(client)
     assert list(tmp_path.iterdir()) == []
 

@@ -111,10 +111,10 @@ def test_a_scene_that_was_saved_is_listed(tmp_path):
 @pytest.mark.parametrize(
     ("name", "sentence"),
     [
-        ("gripper/wsg50_one_motor_gripper_free_base.sdf", "pybullet dies of .*free_base.sdf with signal SIGSEGV"),
+        ("gripper/wsg50_one_motor_gripper_free_base.sdf", "pybullet crashes on .*free_base.sdf with signal SIGSEGV"),
         ("kuka_iiwa/model_for_sdf.urdf", "model_for_sdf.urdf cannot be read: pybullet says 'Cannot load URDF file'"),
         ("no_such.urdf", "there is no file .*no_such.urdf"),
-        ("plane.obj", r"must end in \.urdf, \.sdf, \.xml, \.bullet, and 'plane.obj' does not"),
+        ("plane.obj", r"must end in \.urdf, \.sdf, \.xml, \.bullet, not 'plane.obj'"),
     ],
 )
 def test_a_file_that_pybullet_does_not_load_is_reported_in_one_sentence(name, sentence, monkeypatch):

@@ -233,7 +233,7 @@ def test_the_report_counts_pairs_that_only_margins_hold_apart(client):
     contacts = bodies.overlaps()
     assert bodies.report().pairs_within_margins == 2
     assert str(bodies.report()).splitlines()[-1] == (
-        "2 more pairs of links touch only within the margins that Bullet lays around hulls; surface 'margin' shows them"
+        "2 more pairs of links touch only with the collision margins of Bullet; surface='margin' measures them"
     )
     margined = Bodies(client, surface="margin")
     assert len(margined.overlaps()) == len(contacts) + 2

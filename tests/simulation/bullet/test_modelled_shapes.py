@@ -227,7 +227,7 @@ def test_models_have_all_their_shapes(client, model, shapes):
 
 
 def test_capsules_that_kill_get_collision_shape_data_are_read_and_placed(client):
-    """The multi-spheres of ant.xml: pybullet dies of a call that it answers for other shapes."""
+    """The multi-spheres of ant.xml: pybullet crashes on a call that it answers for other shapes."""
     (ant,) = p.loadMJCF("mjcf/ant.xml", physicsClientId=client)
     bodies = Bodies(client)
     links = [link for _, link, _ in bodies.keys]
@@ -342,7 +342,7 @@ def test_bodies_from_load_bullet_are_counted_as_skipped(client, tmp_path):
     with Recorder(client) as recorder:
         watched = Bodies(client, recorder=recorder)
         p.loadBullet(path, physicsClientId=client)
-        with pytest.warns(SkippedShapeWarning, match="1 body .*pybullet gives no id to what loadBullet brings"):
+        with pytest.warns(SkippedShapeWarning, match="1 body .*pybullet gives no id to bodies from loadBullet"):
             watched.update()
         with pytest.warns(SkippedShapeWarning, match="1 body "):
             bodies = Bodies(client)

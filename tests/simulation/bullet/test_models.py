@@ -83,6 +83,6 @@ def test_the_collections_are_all_there():
 
 
 def test_a_model_that_crashes_pybullet_is_not_counted_as_modelled(tmp_path):
-    """pybullet dies of this file in loadSDF; that shows here, so that no death goes unnoticed above."""
+    """pybullet crashes on this file in loadSDF; that shows here, so that no death goes unnoticed above."""
     path = str(models()[KILLS_PYBULLET])
     assert walk([path], tmp_path / "results") == {path: None}
