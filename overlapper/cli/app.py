@@ -75,7 +75,7 @@ def overlapper(
 
 
 def scenes() -> None:
-    """List the scenes that can be run by name: those of the checkout, and those of the folder `scenes` here."""
+    """List the scenes that can be run by name: the sample scenes, and those of the folder `scenes` here."""
     for name, path in scene_paths().items():
         say(f"{name:22}{headline(path)}")
 

@@ -75,11 +75,16 @@ class Scene:
 
 
 def scene_paths() -> dict[str, Path]:
-    """The scenes that can be run by name: of the checkout, and of the folder `scenes` here, which has precedence."""
-    checkout = Path(__file__).parents[2]
-    folders = [checkout / "scenes"] if (checkout / "pyproject.toml").is_file() else []
-    paths = {path.stem: path for folder in [*folders, Path("scenes")] for path in folder.glob("[!_]*.py")}
+    """The scenes that can be run by name: of the folder `scenes` here, and the sample scenes with other names."""
+    paths = {path.stem: path for folder in [_samples(), Path("scenes")] for path in folder.glob("[!_]*.py")}
     return dict(sorted(paths.items()))
+
+
+def _samples() -> Path:
+    """The folder of the sample scenes: that of a checkout, or the copy that the build puts into the wheel."""
+    package = Path(__file__).parents[1]
+    checkout = package.parent
+    return checkout / "scenes" if (checkout / "pyproject.toml").is_file() else package / "samples/scenes"
 
 
 def is_scene(path: Path) -> bool:

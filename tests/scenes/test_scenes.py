@@ -8,6 +8,7 @@ import pybullet as p
 import pytest
 
 from overlapper.reference import Fcl
+from overlapper.scenes import scene as scene_module
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import load_scene
 from overlapper.verdicts.comparison import compare_measures
@@ -141,3 +142,16 @@ def test_a_peg_that_leans_is_pushed_back_by_every_wall():
     # It leans about x, towards what is across.
     across, along, _ = np.abs(frame.forces.force.sum(axis=0))
     assert across < 1e-6 < 0.5 * pushed.sum() < along
+
+
+def test_the_sample_scenes_of_an_installed_package_are_found(tmp_path, monkeypatch):
+    installed = tmp_path / "site-packages/overlapper"
+    samples = installed / "samples/scenes"
+    samples.mkdir(parents=True)
+    for name in ("stack", "ramp"):
+        (samples / f"{name}.py").write_text('"""A sample."""')
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes/ramp.py").write_text('"""Our own."""')
+    monkeypatch.setattr(scene_module, "__file__", str(installed / "scenes/scene.py"))
+    monkeypatch.chdir(tmp_path)
+    assert scene_module.scene_paths() == {"ramp": Path("scenes/ramp.py"), "stack": samples / "stack.py"}
