@@ -26,7 +26,7 @@ HERE = Path(__file__).resolve().parent
 
 WORDS = """\
 <!-- Written by docs/economy.py. -->
-# Model no more than the scene needs
+# Choosing shapes: time of balls, boxes and hulls
 
 What `update()` and `overlaps()` look at in a step of each scene of [`scenes/`](../scenes), on average over all of its
 steps, and for how long.

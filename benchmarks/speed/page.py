@@ -117,7 +117,7 @@ def accuracy_panel(family: str, rows: list[Row]) -> Panel:
     )
 
 
-# Time over size
+# Time by number of vertices
 
 
 @dataclass(frozen=True)
