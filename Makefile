@@ -120,11 +120,20 @@ ci: ## all that a change must pass (a quarter of an hour on 2 cores)
 clean: ## remove environments, builds and what was written to out/
 	@rm -rf $(VENV) build out
 
+# The module that finds an editable package is imported before pytest, which warns that it cannot rewrite its assertions.
+define QUIET_PYTEST
+import pathlib, _editable_skbc_overlapper as finder
+file = pathlib.Path(finder.__file__)
+file.write_text('"""PYTEST_DONT_REWRITE"""\n' + file.read_text())
+endef
+export QUIET_PYTEST
+
 # The installation is editable: only changes of native sources or dependencies need a new build.
 $(VENV)/built: pyproject.toml $(NATIVE) | $(VENV)/bin/python
 	@echo "Building overlapper in $(VENV) (some minutes the first time, seconds after a change)"
 	@start=$$(date +%s); \
 	  $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable . && \
+	  $(VENV)/bin/python -c "$$QUIET_PYTEST" && \
 	  echo "Built in $$(($$(date +%s) - start)) s"
 	@touch $@
 

@@ -54,7 +54,9 @@ def test_the_modules_that_the_plugin_needs_are_loaded_only_once():
 def test_a_new_scene_is_written_fails_once_and_passes_from_then_on(scenes):
     new = scenes()
     new.assert_outcomes(failed=1)
-    new.stdout.fnmatch_lines(["the scene slide is new", "written: *expected/slide.csv", "look at it, commit it*"])
+    new.stdout.fnmatch_lines(
+        ["the scene slide is new", "written: *expected/slide.csv", "look at the file and commit it*"]
+    )
     assert (scenes.folder / "expected" / "slide.csv").is_file()
     scenes().assert_outcomes(passed=1)
 
@@ -75,7 +77,7 @@ def test_a_moved_scene_says_what_moved_and_shows_before_and_after(scenes, pytest
             "overlaps  *",
             "    step 4, *(0/-1/0) and *(1/-1/0): volume_m3 is 0.14, recorded as 0.17: off by 0.03, 17.6 %",
             "before and after: *pages/slide.moved.html",
-            "if this is as it should be: pytest --overlapper-record scenes/slide.py",
+            "to accept the change: pytest --overlapper-record scenes/slide.py",
         ]
     )
     page = (pytester.path / "pages" / "slide.moved.html").read_text(encoding="utf-8")
@@ -106,7 +108,7 @@ def test_a_loose_budget_is_reported_of_a_scene_that_passes(scenes):
     expected.write_text(re.sub(r"volume: relative \S+", "volume: relative 0.5", expected.read_text()))
     run = scenes()
     run.assert_outcomes(passed=1)
-    run.stdout.fnmatch_lines(["slide: note: the budget of volume is * times what is needed"])
+    run.stdout.fnmatch_lines(["slide: note: the budget of volume is * times as large as needed"])
 
 
 def test_a_scene_that_cannot_be_run_fails_with_one_sentence(scenes):
@@ -160,3 +162,10 @@ def test_other_runs_import_nothing_for_the_plugin(pytester):
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stdout
     assert "overlapper" not in done.stdout
+
+
+def test_an_editable_install_gives_no_warning_of_pytest(tmp_path):
+    (tmp_path / "test_nothing.py").write_text("def test_nothing(): pass\n")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_nothing.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, "warning" in done.stdout) == (0, False), done.stdout
