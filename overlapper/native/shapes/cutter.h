@@ -19,6 +19,8 @@ class Cutter {
   virtual void face(const WidePlane& plane) = 0;  ///< a plane with part of the shape's surface
   virtual void cut(const WidePlane& plane) = 0;   ///< a plane between two pieces
   virtual void off(double flatness) = 0;          ///< m: the surface may be that far from the faces
+  /// m³ and m²: the pieces may miss, or share, that much volume and surface.
+  virtual void gap(double volume, double area) = 0;
 
   virtual bool empty() const = 0;                     ///< nothing of the piece is in the region
   virtual bool few() const = 0;                       ///< slices have room for as many planes of another body

@@ -209,6 +209,7 @@ class RoundedCutter {
     const auto ring = hull_.facet(f);
     const Plane& plane = hull_.planes[f];
     if (!near(ring)) return;
+    if (inexact(f)) charge_corners(ring, plane.normal);
     if (cutter_.beyond({plane.normal, plane.offset + radius_}) || cutter_.beyond({-plane.normal, -plane.offset}))
       return;
     cutter_.begin();
@@ -228,6 +229,7 @@ class RoundedCutter {
     const Vec3 out_left = hull_.planes[edge.left].normal, out_right = hull_.planes[edge.right].normal;
     if (beyond(way, b) || beyond(-way, a) || beyond(cross(out_left, way), a) || beyond(cross(way, out_right), a))
       return;
+    if (inexact(edge.left) || inexact(edge.right)) charge_fold(dot(cross(out_left, out_right), way), norm(b - a));
     const WideVector between = wide_difference(b, a), along = unit(between);
     cutter_.begin();
     cutter_.cylinder(DoubleDouble{0.5} * (wide(a) + wide(b)), along, radius_, rounded(norm(between)) / 2);
@@ -261,6 +263,29 @@ class RoundedCutter {
 
  private:
   bool beyond(Vec3 normal, Vec3 point) const { return cutter_.beyond({normal, dot(normal, point)}); }
+  bool inexact(int f) const { return hull_.facet_corners[f][0] < 0; }
+
+  /// A prism ends along the normal of its facet. The ball at a corner ends across the two edges there. If the plane of
+  /// the facet does not contain these edges, the pieces differ by the area between the normal and the great circles of
+  /// both ends on the unit sphere.
+  void charge_corners(std::span<const int> ring, Vec3 normal) {
+    for (size_t i = 0; i < ring.size(); ++i) {
+      const Vec3 at = hull_.vertices[ring[i]];
+      const Vec3 before = unit(hull_.vertices[ring[(i + ring.size() - 1) % ring.size()]] - at);
+      const Vec3 after = unit(hull_.vertices[ring[(i + 1) % ring.size()]] - at);
+      const double tilt = std::abs(dot(normal, before)) + std::abs(dot(normal, after)) + 4 * DBL_EPSILON;
+      const double sine = norm(cross(before, after)), sphere = 4 * std::numbers::pi;
+      const double solid_angle = tilt * tilt < sphere * sine ? tilt * tilt / sine : sphere;
+      cutter_.gap(solid_angle * radius_ * radius_ * radius_ / 3, solid_angle * radius_ * radius_);
+    }
+  }
+  /// If the planes of two facets turn inwards at their edge, both prisms, and the core and the wedge of the cylinder,
+  /// share a sector.
+  void charge_fold(double sine, double length) {
+    if (!(sine < 0)) return;
+    const double sector = -sine * radius_ * length;
+    cutter_.gap(sector * radius_, 2 * sector);
+  }
   void cut_through(const WideVector& normal, Vec3 point) { cutter_.cut({normal, dot(normal, wide(point))}); }
 
   const Hull& core_;

@@ -659,6 +659,29 @@ def test_a_face_within_rounding_of_a_core_corner_is_measured_correctly():
         assert found.volume_error <= 1e-11 * found.volume
 
 
+def test_pieces_of_a_rounded_hull_with_twin_corners_state_the_gaps_between_them():
+    """Two corners lie 4e-13 apart on two facets with a fourth corner 1e-16 off the plane of the others. The short edge
+    is tilted out of both planes by 3e-4, so the wedges of balls at its ends share 1e-10 of the volume."""
+    corners = [
+        (-0.0003662109375, -3, 3.0000000000002274),
+        (0.0014648437500000002, 3.0000000000000004, 3),
+        (-0.0003662109375, 2.9999999999999996, 4.4408920985006262e-16),
+        (0.0014648437499999998, 2.2204460492503131e-16, 8.7311491370201111e-11),
+        (-0.00036621093750006408, -3.0000000000001315, 2.9999999999998685),
+        (-0.00146484375, -0.75, -0.75),
+        (0.0014648437499621041, 3.8805329320249861e-11, 9.7012768189112388e-12),
+        (-0.00048828124999999978, -3, 0),
+        (-2.8720525379199709e-05, 2, -0.18431372549021741),
+    ]
+    hull, rng = RoundedHull(corners, 0.375), np.random.default_rng(1)
+    for _ in range(20):
+        normal, level = rng.normal(size=3), rng.uniform(-0.3, 0.3)
+        parts = [overlap(Placed(hull), HalfSpace(side * normal, side * level)) for side in (1, -1)]
+        off = abs(sum(part.volume for part in parts) - hull.volume)
+        assert off <= sum(part.volume_error for part in parts)
+        assert all(part.volume_error < 1e-7 * hull.volume for part in parts)
+
+
 def test_a_pair_split_by_two_planes_within_rounding_is_sliced():
     # The plane in which a capsule becomes a half ball lies in a face, turned by the rounding of a quaternion.
     capsule = Placed(Capsule(2, 1))

@@ -78,11 +78,12 @@ std::optional<Sums> best_sums(PieceSetting setting, const Sums& none, Add add) {
 std::optional<RoundMeasures> measures_of(const Totals& totals, const BothPieces& both, Vec3 inside) {
   RoundMeasures result;
   result.volume = totals.volume;
-  result.volume_error = off(totals);
+  result.volume_error = off(totals) + both.a.gaps + both.b.gaps;
   if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
   result.volume_error += (both.a.misplaced() + both.b.misplaced()) * totals.area;
   result.area = totals.area, result.first_area = totals.first_area;
-  result.area_error = totals.area_error + missing_area(totals.unbalanced, totals.border);
+  result.area_error = totals.area_error + missing_area(totals.unbalanced, totals.border) + both.a.gap_area +
+                      both.b.gap_area;
   result.rounding = rounding_of_surfaces(sum_of(totals.squares) / totals.volume) + both.a.rounding + both.b.rounding;
   result.centroid = inside + totals.first / totals.volume;
   result.inertia = totals.inertia_about_centroid();

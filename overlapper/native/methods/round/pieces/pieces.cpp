@@ -62,6 +62,7 @@ class PlacingCutter final : public Cutter {
   void face(const WidePlane& plane) override { wall(plane, owner_); }
   void cut(const WidePlane& plane) override { wall(plane, slicing::kCut); }
   void off(double flatness) override { result_.flatness = std::max(result_.flatness, flatness); }
+  void gap(double volume, double area) override { result_.gaps += volume, result_.gap_area += area; }
 
   bool empty() const override { return empty_; }
   bool few() const override { return walls() - piece_.first_wall <= slicing::kMostLines / 2; }

@@ -26,12 +26,14 @@ struct Pieces {
   std::vector<Wall> walls;
   double flatness = 0;  ///< m: largest distance of a facet's plane from its corners
   double rounding = 0;  ///< m: movement of surfaces by the rounding of double-doubles
+  double gaps = 0;      ///< m³: volume that the pieces may miss or share
+  double gap_area = 0;  ///< m²: surface that the pieces may miss or share
 
   /// The walls of a piece.
   std::span<const Wall> of(int piece) const {
     return std::span(walls).subspan(pieces[piece].first_wall, pieces[piece].walls);
   }
-  void clear() { pieces.clear(), rounds.clear(), walls.clear(), flatness = rounding = 0; }
+  void clear() { pieces.clear(), rounds.clear(), walls.clear(), flatness = rounding = gaps = gap_area = 0; }
   double misplaced() const { return flatness + rounding; }
 };
 
