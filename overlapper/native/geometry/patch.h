@@ -66,6 +66,13 @@ class PatchSums {
     add(w, w / 3 * su, w / 3 * sv, second(au, au, su * su), second(au, av, su * sv), second(av, av, sv * sv));
   }
 
+  /// Adds more - less, which both contain this already.
+  void add_difference(const PatchSums& more, const PatchSums& less) {
+    sum(more.one_ - less.one_, more.u1_ - less.u1_, more.v1_ - less.v1_, more.uu_ - less.uu_, more.uv_ - less.uv_,
+        more.vv_ - less.vv_);
+    edges_alone_ = false;
+  }
+
   Patch patch() const;
 
  private:

@@ -103,10 +103,11 @@ inline WideVector apply_transposed(const Mat3& m, const WideVector& v) {
   return v.x * wide(m.row0) + v.y * wide(m.row1) + v.z * wide(m.row2);
 }
 
-/// The length of a vector. Scaling by a power of two first keeps the squares in range.
+/// The length of a vector. Scaling by a power of two first keeps the squares in range, where they would leave it.
 inline DoubleDouble norm(const WideVector& v) {
   const double largest = max_component(abs(rounded(v)));
   if (!(largest > 0)) return {};
+  if (largest > 1e-100 && largest < 1e100) return sqrt(dot(v, v));
   const int exponent = std::ilogb(largest);
   const DoubleDouble down{std::scalbn(1.0, -exponent)}, up{std::scalbn(1.0, exponent)};
   const WideVector scaled = down * v;

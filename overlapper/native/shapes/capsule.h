@@ -9,6 +9,7 @@ struct Hull;
 
 /// Around the local z axis; `length` is the distance between the centres of the caps.
 struct Capsule : Bounded,
+                 NotMitred,
                  Smooth,
                  CentredAtOrigin,
                  WithoutHullData,

@@ -87,6 +87,11 @@ struct NotCut {
   static void give_pieces(Cutter&) {}
 };
 
+/// It is not a polytope with rounded edges and vertices.
+struct NotMitred {
+  static bool give_mitred(Cutter&) { return false; }
+};
+
 /// All of it is one piece inside its facets.
 template <class S>
 struct CutByFacets {
@@ -96,6 +101,7 @@ struct CutByFacets {
     for (int f = 0; f < shape.facet_count(); ++f) cutter.face(*shape.unit_facet(f));
     cutter.end();
   }
+  bool give_mitred(auto& cutter) const { return give_pieces(cutter), true; }
 };
 
 struct NotRevolved {

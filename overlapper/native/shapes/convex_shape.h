@@ -79,6 +79,9 @@ concept Classified = requires(const S& s, Cutter& cutter) {
   { s.polytope() } -> std::convertible_to<const HullData*>;
   // Parts of balls and cylinders within planes. A stretched ball gives the ball of radius 1.
   { s.give_pieces(cutter) };
+  // The polytope within its facets, or within facets moved out by the margin. Then for each edge and each vertex, the
+  // part of this polytope over it, and the cylinder or the ball that rounds it off. False for other shapes.
+  { s.give_mitred(cutter) } -> std::same_as<bool>;
 };
 
 template <class S>

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <utility>
+
 #include "geometry/bounds.h"
 #include "geometry/wide.h"
 
@@ -18,15 +20,21 @@ class Cutter {
   virtual void cylinder(const WideVector& centre, const WideVector& axis, double radius, double half_length) = 0;
   virtual void face(const WidePlane& plane) = 0;  ///< a plane with part of the shape's surface
   virtual void cut(const WidePlane& plane) = 0;   ///< a plane between two pieces
-  virtual void off(double flatness) = 0;          ///< m: the surface may be that far from the faces
+
+  /// Several pieces share a plane. It is placed once, and the pieces name its number.
+  virtual int place(const WidePlane& plane) = 0;
+  virtual void face_beyond(int plane, double distance) = 0;  ///< a parallel plane outside of it
+  virtual void cut_inside(int plane) = 0;
+  virtual void cut_outside(int plane) = 0;
+  virtual void off(double flatness) = 0;  ///< m: the surface may be that far from the faces
   /// m³ and m²: the pieces may miss, or share, that much volume and surface.
   virtual void gap(double volume, double area) = 0;
 
-  virtual bool empty() const = 0;                     ///< nothing of the piece is in the region
-  virtual bool few() const = 0;                       ///< slices have room for as many planes of another body
-  virtual bool beyond(const Plane& plane) const = 0;  ///< the region is surely beyond the plane
-  virtual bool within(const Plane& plane) const = 0;  ///< the region is surely nowhere beyond the plane
-  virtual Bounds region(double wider_by) const = 0;   ///< a box around it, infinite if the region is not known
+  virtual bool empty() const = 0;  ///< nothing of the piece is in the region
+  virtual bool few() const = 0;    ///< slices have room for as many planes of another body
+  /// m: bounds of the signed distances of the region's points from the plane.
+  virtual std::pair<double, double> heights(const Plane& plane) const = 0;
+  virtual Bounds region(double wider_by) const = 0;  ///< a box around it, infinite if the region is not known
 
   void whole_ball(double radius) { begin(), ball({}, radius), end(); }
 

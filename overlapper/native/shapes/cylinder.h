@@ -9,6 +9,7 @@ struct Hull;
 
 /// Around the local z axis.
 struct Cylinder : Bounded,
+                  NotMitred,
                   Smooth,
                   CentredAtOrigin,
                   WithoutHullData,

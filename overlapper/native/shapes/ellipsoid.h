@@ -9,6 +9,7 @@ struct Hull;
 
 /// About the origin, its axes along x, y and z: a stretched ball.
 struct Ellipsoid : Bounded,
+                   NotMitred,
                    Smooth,
                    CentredAtOrigin,
                    WithoutHullData,

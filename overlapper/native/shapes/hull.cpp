@@ -96,7 +96,7 @@ void Hull::give_pieces(Cutter& cutter) const {
   }
   for (int f = 0; f < facet_count() && !cutter.empty(); ++f) {
     cancellation_point();
-    if (!cutter.within(facet(f))) cutter.face(plane_through_corners(f));
+    if (!(cutter.heights(facet(f)).second < 0)) cutter.face(plane_through_corners(f));
   }
   cutter.off(inexact);
   cutter.end();

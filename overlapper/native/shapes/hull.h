@@ -86,6 +86,7 @@ Examples
   /// The plane of a facet through three of its corners, exactly. Other corners may be off the plane by the flatness.
   WidePlane plane_through_corners(int f) const;
   void give_pieces(Cutter& cutter) const;
+  bool give_mitred(Cutter& cutter) const { return give_pieces(cutter), true; }
   Hull inscribed(double) const { return *this; }
 
   std::shared_ptr<const HullData> data;

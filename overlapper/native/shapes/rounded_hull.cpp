@@ -1,12 +1,15 @@
 #include "shapes/rounded_hull.h"
 
 #include <algorithm>
+#include <array>
 #include <cfloat>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
 
 #include "geometry/cancellation.h"
+#include "geometry/scratch.h"
 #include "shapes/cutter.h"
 #include "shapes/limits.h"
 #include "shapes/sphere.h"
@@ -194,61 +197,178 @@ void RoundedHull::append_wide_planes(const WideBody& body, std::vector<WidePlane
 
 namespace {
 
-/// Cuts what surrounds the core. Parts that the region does not reach are left out.
+/// The facets, edges and vertices of a core, as far as they matter in a region, and the planes that several pieces
+/// share. A negative number belongs to a plane that is not yet placed.
+struct SharedPlanes {
+  struct Base {
+    double least, most;  ///< m: bounds of the signed distances of the region's points
+    int plane;
+    WideVector normal;  ///< if it is placed
+  };
+  struct Ends {
+    int from, to;  ///< planes across an edge, outwards beyond `to`
+    WideVector along;
+  };
+  struct Beside {
+    int vertex, other, edge;
+    bool operator<(const Beside& o) const { return std::pair(vertex, other) < std::pair(o.vertex, o.other); }
+  };
+  std::vector<Base> bases;
+  std::vector<int> sides;    ///< for each corner of a ring, the plane along the facet's normal through its next edge
+  std::vector<Ends> ends;    ///< for each edge
+  std::vector<char> raised;  ///< for each vertex: the region may reach beyond a facet there
+  std::vector<Beside> beside;
+};
+
+/// Cuts a rounded hull. Parts that the region does not reach are left out.
 class RoundedCutter {
  public:
-  RoundedCutter(const RoundedHull& rounded, Cutter& cutter)
-      : core_(rounded.core),
-        hull_(*core_.data),
-        radius_(rounded.radius),
-        cutter_(cutter),
-        near_(cutter.region(radius_)) {}
+  /// Leaves out pieces around features farther from a box than the radius.
+  RoundedCutter(const RoundedHull& rounded, Cutter& cutter, const Bounds& near)
+      : core_(rounded.core), hull_(*core_.data), radius_(rounded.radius), cutter_(cutter), near_(near) {
+    shared_->bases.clear(), shared_->beside.clear();
+    shared_->sides.assign(hull_.ring.size(), kNotPlaced);
+    shared_->ends.assign(hull_.edges.size(), {kNotPlaced, kNotPlaced, {}});
+    shared_->raised.assign(hull_.vertices.size(), false);
+  }
 
-  /// A prism on the facet.
-  void cut_facet(int f) {
-    const auto ring = hull_.facet(f);
-    const Plane& plane = hull_.planes[f];
-    if (!near(ring)) return;
-    if (inexact(f)) charge_corners(ring, plane.normal);
-    if (cutter_.beyond({plane.normal, plane.offset + radius_}) || cutter_.beyond({-plane.normal, -plane.offset}))
-      return;
+  void cut_core() {
     cutter_.begin();
-    const auto [normal, offset] = core_.plane_through_corners(f);
-    cutter_.cut({-normal, -offset});
-    cutter_.face({normal, offset + DoubleDouble{radius_}});
-    for (size_t i = 0; i < ring.size() && !cutter_.empty(); ++i) {
-      const Vec3 a = hull_.vertices[ring[i]], b = hull_.vertices[ring[(i + 1) % ring.size()]];
-      cut_through(unit(cross(wide_difference(b, a), normal)), a);
+    for (int f = 0; f < static_cast<int>(hull_.planes.size()); ++f) {
+      cancellation_point();
+      const auto [least, most] = cutter_.heights(hull_.planes[f]);
+      shared_->bases.push_back({least, most, kNotPlaced, {}});
+      if (!raised(f)) continue;
+      for (const int v : hull_.facet(f)) shared_->raised[v] = true;
+      if (!cutter_.empty()) cutter_.cut_inside(base(f).plane);
     }
     cutter_.end();
   }
 
-  /// A wedge of a cylinder along the edge.
-  void cut_edge(const Edge& edge) {
-    const Vec3 a = hull_.vertices[edge.from], b = hull_.vertices[edge.to], way = unit(b - a);
-    const Vec3 out_left = hull_.planes[edge.left].normal, out_right = hull_.planes[edge.right].normal;
-    if (beyond(way, b) || beyond(-way, a) || beyond(cross(out_left, way), a) || beyond(cross(way, out_right), a))
-      return;
-    if (inexact(edge.left) || inexact(edge.right)) charge_fold(dot(cross(out_left, out_right), way), norm(b - a));
-    const WideVector between = wide_difference(b, a), along = unit(between);
+  /// The polytope within the facets moved out. False if the region reaches beyond a facet at an edge where that
+  /// polytope has an angle below 60 degrees, so that it is much larger than the rounded hull.
+  bool cut_mitred() {
+    constexpr double kSharp = -0.5;
     cutter_.begin();
-    cutter_.cylinder(DoubleDouble{0.5} * (wide(a) + wide(b)), along, radius_, rounded(norm(between)) / 2);
-    cut_through(-along, a);
-    cut_through(along, b);
-    // Seen from outside, the left facet is on the left of the edge, so the direction beyond it is the opposite one.
-    if (!cutter_.empty()) cut_through(unit(cross(core_.plane_through_corners(edge.left).normal, along)), a);
-    if (!cutter_.empty()) cut_through(unit(cross(along, core_.plane_through_corners(edge.right).normal)), a);
+    for (int f = 0; f < static_cast<int>(hull_.planes.size()); ++f) {
+      cancellation_point();
+      const auto [least, most] = cutter_.heights(hull_.planes[f]);
+      shared_->bases.push_back({least, most, kNotPlaced, {}});
+      if (raised(f))
+        for (const int v : hull_.facet(f)) shared_->raised[v] = true;
+      if (!(most < radius_)) cutter_.face_beyond(base(f).plane, radius_);
+    }
+    cutter_.end();
+    return std::ranges::none_of(hull_.edges, [&](const Edge& edge) {
+      return dot(hull_.planes[edge.left].normal, hull_.planes[edge.right].normal) < kSharp &&
+             (raised(edge.left) || raised(edge.right));
+    });
+  }
+
+  /// A prism on the facet.
+  void cut_facet(int f) {
+    const auto ring = hull_.facet(f);
+    if (!near(ring)) return;
+    if (inexact(f)) charge_corners(ring, hull_.planes[f].normal);
+    if (!raised(f) || shared_->bases[f].least > radius_) return;
+    cutter_.begin();
+    cutter_.cut_outside(base(f).plane);
+    cutter_.face_beyond(base(f).plane, radius_);
+    for (size_t i = 0; i < ring.size() && !cutter_.empty(); ++i) cutter_.cut_inside(side(f, ring[i]));
     cutter_.end();
   }
 
-  /// A wedge of a ball at a vertex. `beside` has the vertex with each vertex that it shares an edge with.
-  void cut_vertex(std::span<const std::pair<int, int>> beside) {
-    const Vec3 vertex = hull_.vertices[beside[0].first];
-    for (const auto& [_, other] : beside)
+  /// A wedge of a cylinder along the edge.
+  void cut_edge(int e) {
+    const Edge& edge = hull_.edges[e];
+    const std::array<int, 2> both{edge.from, edge.to};
+    if (!near(both)) return;
+    for (const int i : {0, 1})
+      if (shared_->raised[both[i]] && near(std::span(both).subspan(i, 1)))
+        shared_->beside.push_back({both[i], both[1 - i], e});
+    // Each direction between two normals points away from one of the two facets.
+    if (!raised(edge.left) && !raised(edge.right)) return;
+    const Vec3 a = hull_.vertices[edge.from], b = hull_.vertices[edge.to], way = unit(b - a);
+    const double length = norm(b - a);
+    const auto [least, most] = cutter_.heights({way, dot(way, b)});
+    if (least > 0 || most + length < 0) return;
+    const Vec3 out_left = hull_.planes[edge.left].normal, out_right = hull_.planes[edge.right].normal;
+    if (beyond(cross(out_left, way), a) || beyond(cross(way, out_right), a)) return;
+    if (inexact(edge.left) || inexact(edge.right)) charge_fold(dot(cross(out_left, out_right), way), length);
+    const SharedPlanes::Ends& ends = ends_of(e);
+    cutter_.begin();
+    cutter_.cylinder(DoubleDouble{0.5} * (wide(a) + wide(b)), ends.along, radius_,
+                     rounded(norm(wide_difference(b, a))) / 2);
+    cutter_.cut_outside(ends.from);
+    cutter_.cut_inside(ends.to);
+    // Seen from outside, the left facet is on the left of the edge, so its ring has the edge in this direction.
+    if (!cutter_.empty()) cutter_.cut_outside(side(edge.left, edge.from));
+    if (!cutter_.empty()) cutter_.cut_outside(side(edge.right, edge.to));
+    cutter_.end();
+  }
+
+  /// A wedge of a ball at each vertex.
+  void cut_vertices() {
+    std::vector<SharedPlanes::Beside>& all = shared_->beside;
+    std::ranges::sort(all, std::less{});
+    for (size_t i = 0, end; i < all.size(); i = end) {
+      for (end = i + 1; end < all.size() && all[end].vertex == all[i].vertex;) ++end;
+      cut_vertex(std::span(all).subspan(i, end - i));
+    }
+  }
+
+ private:
+  static constexpr int kNotPlaced = -1;
+
+  /// Whether the region may reach beyond the facet.
+  bool raised(int f) const { return !(shared_->bases[f].most < 0); }
+
+  const SharedPlanes::Base& base(int f) {
+    SharedPlanes::Base& base = shared_->bases[f];
+    if (base.plane == kNotPlaced) {
+      const WidePlane plane = core_.plane_through_corners(f);
+      base.plane = cutter_.place(plane), base.normal = plane.normal;
+    }
+    return base;
+  }
+
+  /// The plane through the edge that begins at this vertex in the ring of the facet.
+  int side(int f, int vertex) {
+    const auto ring = hull_.facet(f);
+    const size_t i = std::ranges::find(ring, vertex) - ring.begin();
+    int& plane = shared_->sides[hull_.ring_start[f] + i];
+    if (plane == kNotPlaced) {
+      const Vec3 a = hull_.vertices[vertex], b = hull_.vertices[ring[(i + 1) % ring.size()]];
+      plane = through(unit(cross(wide_difference(b, a), base(f).normal)), a);
+    }
+    return plane;
+  }
+
+  const SharedPlanes::Ends& ends_of(int e) {
+    SharedPlanes::Ends& ends = shared_->ends[e];
+    if (ends.from == kNotPlaced) {
+      const Vec3 a = hull_.vertices[hull_.edges[e].from], b = hull_.vertices[hull_.edges[e].to];
+      ends.along = unit(wide_difference(b, a));
+      ends.from = through(ends.along, a), ends.to = through(ends.along, b);
+    }
+    return ends;
+  }
+
+  bool beyond(Vec3 normal, Vec3 point) const { return cutter_.heights({normal, dot(normal, point)}).first > 0; }
+  int through(const WideVector& normal, Vec3 point) { return cutter_.place({normal, dot(normal, wide(point))}); }
+
+  void cut_vertex(std::span<const SharedPlanes::Beside> beside) {
+    const int v = beside[0].vertex;
+    const Vec3 vertex = hull_.vertices[v];
+    for (const auto& [_, other, edge] : beside)
       if (beyond(unit(hull_.vertices[other] - vertex), vertex)) return;
     cutter_.begin();
     cutter_.ball(wide(vertex), radius_);
-    for (const auto& [_, other] : beside) cut_through(unit(wide_difference(hull_.vertices[other], vertex)), vertex);
+    for (const auto& [_, other, edge] : beside) {
+      const SharedPlanes::Ends& ends = ends_of(edge);
+      if (hull_.edges[edge].from == v) cutter_.cut_inside(ends.from);
+      else cutter_.cut_outside(ends.to);
+    }
     cutter_.end();
   }
 
@@ -261,8 +381,6 @@ class RoundedCutter {
            upper.x >= near_.lower.x && upper.y >= near_.lower.y && upper.z >= near_.lower.z;
   }
 
- private:
-  bool beyond(Vec3 normal, Vec3 point) const { return cutter_.beyond({normal, dot(normal, point)}); }
   bool inexact(int f) const { return hull_.facet_corners[f][0] < 0; }
 
   /// A prism ends along the normal of its facet. The ball at a corner ends across the two edges there. If the plane of
@@ -286,43 +404,41 @@ class RoundedCutter {
     const double sector = -sine * radius_ * length;
     cutter_.gap(sector * radius_, 2 * sector);
   }
-  void cut_through(const WideVector& normal, Vec3 point) { cutter_.cut({normal, dot(normal, wide(point))}); }
 
   const Hull& core_;
   const HullData& hull_;
   double radius_;
   Cutter& cutter_;
   Bounds near_;
+  Scratch<SharedPlanes> shared_;
 };
 
 }  // namespace
 
 /// The core, a prism on every facet, a wedge of a cylinder along every edge, and a wedge of a ball at every vertex.
 void RoundedHull::give_pieces(Cutter& cutter) const {
-  const int facets = core.facet_count();
   cutter.off(core.unexact());
-  cutter.begin();
-  for (int f = 0; f < facets && !cutter.empty(); ++f) {
+  RoundedCutter all(*this, cutter, cutter.region(radius));
+  all.cut_core();
+  for (int f = 0; f < core.facet_count(); ++f) all.cut_facet(f);
+  for (int e = 0; e < static_cast<int>(core.edges().size()); ++e) {
     cancellation_point();
-    if (!cutter.within(core.facet(f))) cutter.cut(core.plane_through_corners(f));
+    all.cut_edge(e);
   }
-  cutter.end();
-  RoundedCutter around(*this, cutter);
-  for (int f = 0; f < facets; ++f) around.cut_facet(f);
-  std::vector<std::pair<int, int>> beside;
-  for (const Edge& edge : core.edges()) {
+  all.cut_vertices();
+}
+
+bool RoundedHull::give_mitred(Cutter& cutter) const {
+  if (core.unexact() > 0) return false;
+  const Vec3 far{kInfinity, kInfinity, kInfinity};
+  RoundedCutter all(*this, cutter, {-far, far});
+  if (!all.cut_mitred()) return false;
+  for (int e = 0; e < static_cast<int>(core.edges().size()); ++e) {
     cancellation_point();
-    const std::array<int, 2> ends{edge.from, edge.to};
-    if (!around.near(ends)) continue;
-    around.cut_edge(edge);
-    for (const int i : {0, 1})
-      if (around.near(std::span(ends).subspan(i, 1))) beside.push_back({ends[i], ends[1 - i]});
+    all.cut_edge(e);
   }
-  std::ranges::sort(beside);
-  for (size_t i = 0, end; i < beside.size(); i = end) {
-    for (end = i + 1; end < beside.size() && beside[end].first == beside[i].first;) ++end;
-    around.cut_vertex(std::span(beside).subspan(i, end - i));
-  }
+  all.cut_vertices();
+  return true;
 }
 
 Hull RoundedHull::inscribed(double) const {

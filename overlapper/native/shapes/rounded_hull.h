@@ -73,6 +73,7 @@ Examples
   void append_wide_planes(const WideBody& body, std::vector<WidePlane>& planes) const;
 
   void give_pieces(Cutter& cutter) const;
+  bool give_mitred(Cutter& cutter) const;  ///< false also if facets are not exact or an edge is sharp
   Hull inscribed(double tolerance) const;
 
   Hull core;

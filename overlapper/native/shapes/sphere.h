@@ -8,6 +8,7 @@ namespace overlapper {
 struct Hull;
 
 struct Sphere : Bounded,
+                NotMitred,
                 Smooth,
                 CentredAtOrigin,
                 WithoutHullData,

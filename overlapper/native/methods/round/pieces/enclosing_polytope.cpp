@@ -24,47 +24,69 @@ void EnclosingPolytope::become(const Bounds& box) {
   }
 }
 
+namespace {
+
+/// Memory for a cut: for each corner what is left to the plane, the removed corners, and the edges across the plane
+/// from a corner that stays to a removed one.
+struct CutScratch {
+  struct Crossing {
+    int inner, outer;
+  };
+  std::vector<double> left;
+  std::vector<int> removed;
+  std::vector<Crossing> crossing;
+};
+
+}  // namespace
+
+// Conditions of single corners and edges come out at random, so they move an end instead of choosing a branch.
 bool EnclosingPolytope::cut(const Face& face) {
   constexpr int kFew = 64;
   std::array<double, kFew> few_left;
   std::array<int, kFew> few_removed;
+  std::array<CutScratch::Crossing, 3 * kFew> few_crossing;
   double* left = few_left.data();
   int* removed = few_removed.data();
+  CutScratch::Crossing* crossing = few_crossing.data();
   const int before = static_cast<int>(corners.size());
   if (before > kFew) {
-    thread_local std::pair<std::vector<double>, std::vector<int>> of_thread;
-    auto& [many_left, many_removed] = of_thread;  // avoids repeated lookups of thread_local
-    many_left.resize(before), many_removed.resize(before);
-    left = many_left.data(), removed = many_removed.data();
+    thread_local CutScratch of_thread;
+    CutScratch& many = of_thread;  // avoids repeated lookups of thread_local
+    many.left.resize(before), many.removed.resize(before), many.crossing.resize(3 * before);
+    left = many.left.data(), removed = many.removed.data(), crossing = many.crossing.data();
   }
   int gone = 0;
   for (int i = 0; i < before; ++i) {
     left[i] = face.slack - dot(face.normal, corners[i].at);
-    if (!(left[i] >= 0)) removed[gone++] = i;
+    removed[gone] = i;
+    gone += static_cast<int>(!(left[i] >= 0));
   }
   if (gone == 0) return true;
   if (gone == before) return false;
-  const int number = static_cast<int>(faces.size());
-  faces.push_back(face);
-  for (const int outer : std::span(removed, gone))
-    for (int k = 0; k < 3; ++k) {
-      const int inner = corners[outer].beside[k];
-      if (!(left[inner] >= 0)) continue;
-      Corner& stays = corners[inner];
-      const int along = stays.edge_to(outer);
-      const double share = left[inner] / (left[inner] - left[outer]);
-      const Corner added{stays.at + share * (corners[outer].at - stays.at),
-                         {inner, -1, -1},
-                         {stays.face[(along + 2) % 3], number, stays.face[along]}};
-      stays.beside[along] = static_cast<int>(corners.size());
-      corners.push_back(added);
+  int crossings = 0;
+  for (int i = 0; i < gone; ++i)
+    for (const int inner : corners[removed[i]].beside) {
+      crossing[crossings] = {inner, removed[i]};
+      crossings += static_cast<int>(left[inner] >= 0);
     }
+  const int number = static_cast<int>(faces.size()), all = before + crossings;
+  faces.push_back(face);
+  corners.resize(all);
+  for (int i = 0; i < crossings; ++i) {
+    const auto [inner, outer] = crossing[i];
+    Corner& stays = corners[inner];
+    const int along = stays.edge_to(outer);
+    const double share = left[inner] / (left[inner] - left[outer]);
+    corners[before + i] = {stays.at + share * (corners[outer].at - stays.at),
+                           {inner, -1, -1},
+                           {stays.face[before_edge(along)], number, stays.face[along]}};
+    stays.beside[along] = before + i;
+  }
   // Follows each cut face from the corner where its border enters the inside to the corner where it has left it.
-  const int all = static_cast<int>(corners.size());
   for (int start = before; start < all; ++start) {
     int from = start, to = corners[start].beside[0];
     while (to < before) {
-      const int next = corners[to].beside[(corners[to].edge_to(from) + 1) % 3];
+      const int next = corners[to].beside[after_edge(corners[to].edge_to(from))];
       from = to, to = next;
     }
     corners[start].beside[2] = to;
@@ -139,6 +161,8 @@ double EnclosingPolytope::reach(Vec3 point) const {
   for (const Corner& corner : corners) reach2 = std::max(reach2, norm2(corner.at - point));
   return std::sqrt(reach2);
 }
+
+double EnclosingPolytope::inner_radius() const { return std::ranges::min(faces, {}, &Face::slack).slack; }
 
 double EnclosingPolytope::surface() const {
   double twice = 0;

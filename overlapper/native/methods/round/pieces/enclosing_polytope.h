@@ -24,8 +24,11 @@ struct EnclosingPolytope {
     std::array<int, 3> face;    ///< between an edge and the next
 
     /// The number of its edge to another corner.
-    int edge_to(int other) const { return beside[0] == other ? 0 : beside[1] == other ? 1 : 2; }
+    int edge_to(int other) const { return beside[0] == other ? 0 : 2 - static_cast<int>(beside[1] == other); }
   };
+  /// The number of the next edge of a corner, and of the one before it.
+  static int after_edge(int edge) { return edge == 2 ? 0 : edge + 1; }
+  static int before_edge(int edge) { return edge == 0 ? 2 : edge - 1; }
   std::vector<Face> faces;  ///< all faces that have cut it; later cuts may have left nothing of some
   std::vector<Corner> corners;
 
@@ -55,7 +58,8 @@ struct EnclosingPolytope {
   Vec3 middle() const;
   double reach(Vec3 point) const;  ///< upper bound of the distance of a corner
   double extent() const { return reach({}); }
-  double surface() const;  ///< its area
+  double inner_radius() const;  ///< of the ball about the origin inside it
+  double surface() const;       ///< its area
 };
 
 inline constexpr int kNoWall = -1;

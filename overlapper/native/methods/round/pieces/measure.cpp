@@ -8,6 +8,7 @@
 #include "geometry/cancellation.h"
 #include "geometry/scratch.h"
 #include "methods/round/pieces/culling.h"
+#include "methods/round/pieces/mitred.h"
 #include "methods/round/pieces/parts.h"
 #include "methods/round/pieces/piece.h"
 
@@ -37,11 +38,19 @@ struct BothPieces {
     a.clear(), b.clear();
     cut(pair.a, pair.b, common, 0, pair.reference, pair.inside, a);
     cut(pair.b, pair.a, common, 1, pair.reference, pair.inside, b);
-    return pair.outwards == 0 || grow(least_radius(a) > least_radius(b) ? a : b, pair.outwards);
+    return grown(pair.outwards);
+  }
+
+  /// The same with mitred bodies; false also for bodies that are not.
+  bool become_mitred(const SlicedPair& pair, const EnclosingPolytope& common) {
+    a.clear(), b.clear();
+    return cut_mitred(pair.a, pair.b, common, 0, pair.reference, pair.inside, a) &&
+           cut_mitred(pair.b, pair.a, common, 1, pair.reference, pair.inside, b) && grown(pair.outwards);
   }
 
   /// The number of rounds of a pair of pieces.
   int rounds_of(int i, int j) const { return (a.pieces[i].round >= 0) + (b.pieces[j].round >= 0); }
+  bool grown(double outwards) { return outwards == 0 || grow(least_radius(a) > least_radius(b) ? a : b, outwards); }
   void get_rounds(int i, int j, std::vector<Round>& rounds) const {
     rounds.clear();
     if (a.pieces[i].round >= 0) rounds.push_back(a.rounds[a.pieces[i].round]);
@@ -82,8 +91,8 @@ std::optional<RoundMeasures> measures_of(const Totals& totals, const BothPieces&
   if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
   result.volume_error += (both.a.misplaced() + both.b.misplaced()) * totals.area;
   result.area = totals.area, result.first_area = totals.first_area;
-  result.area_error = totals.area_error + missing_area(totals.unbalanced, totals.border) + both.a.gap_area +
-                      both.b.gap_area;
+  result.area_error =
+      totals.area_error + missing_area(totals.unbalanced, totals.border) + both.a.gap_area + both.b.gap_area;
   result.rounding = rounding_of_surfaces(sum_of(totals.squares) / totals.volume) + both.a.rounding + both.b.rounding;
   result.centroid = inside + totals.first / totals.volume;
   result.inertia = totals.inertia_about_centroid();
@@ -204,6 +213,30 @@ struct ManyPieces {
   std::vector<SlicedPart> parts_;
 };
 
+struct MitredPieces {
+  BothPieces both;
+  Mitred mitred;
+};
+
+/// No value if a body is neither a polytope nor a rounded hull, or if doubles are not accurate enough.
+std::optional<RoundMeasures> measure_mitred(const SlicedPair& pair, const EnclosingPolytope& around) {
+  // If margins are much larger than the contact is deep, doubles rarely give what rounds leave out.
+  constexpr double kMostMargin = 16;
+  const double margin = std::max(core_radius(pair.a.shape), core_radius(pair.b.shape));
+  if (!(margin <= kMostMargin * around.inner_radius())) return std::nullopt;
+  const Scratch<MitredPieces> pieces;
+  BothPieces& both = pieces->both;
+  if (!both.become_mitred(pair, around)) return std::nullopt;
+  PieceSetting setting = setting_of(pair);
+  setting.common = &around;
+  Sums sums{{}, pair.patch ? std::optional(*pair.patch) : std::nullopt};
+  if (!pieces->mitred.add_all(both.a, both.b, around, setting, sums)) return std::nullopt;
+  const Totals& totals = sums.totals;
+  if (!(off(totals) <= kMostOpen * totals.volume)) return std::nullopt;
+  if (pair.patch) *pair.patch = *sums.patch;
+  return measures_of(totals, both, rounded(pair.inside));
+}
+
 /// A polytope around the common set that is thin if the contact is shallow: it ends at the smooth body's plane nearest
 /// to the inner point.
 void enclose_closely(const SlicedPair& pair, EnclosingPolytope& around) {
@@ -232,8 +265,8 @@ std::optional<RoundMeasures> measure_pieces(const SlicedPair& pair) {
 std::optional<RoundMeasures> measure_culled_pieces(const SlicedPair& pair) {
   const Scratch<ManyPieces> pieces;
   enclose(pair.a, pair.b, rounded(pair.inside), pieces->around);
+  if (auto measures = measure_mitred(pair, pieces->around)) return measures;
   if (!pieces->both.become(pair, &pieces->around)) return std::nullopt;
-  join(pieces->both.a), join(pieces->both.b);
   pieces->culling.look_at(pieces->both.a, pieces->both.b, pieces->around);
   pieces->near.clear();
   pieces->culling.near(pieces->near);

@@ -5,6 +5,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/rounding.h"
+#include "geometry/scratch.h"
 #include "methods/round/slicing/slice.h"
 
 namespace overlapper::pieces {
@@ -35,6 +36,8 @@ class PlacingCutter final : public Cutter {
     plain_rotation_ = rounded(rotation_), plain_origin_ = rounded(origin_);
     const double size = overlapper::reach(body, norm(plain_origin_) + norm(inside_) + reach(body.shape));
     result_.rounding = std::max(result_.rounding, wide_placing(size, !unturned(body.orientation)));
+    planes_->clear();
+    extent_ = common_ ? common_->extent() : kInfinity;
     margin_ = 1e-12 * (norm(body.pose.translation) + norm(other.pose.translation) + reach(body.shape));
   }
 
@@ -59,15 +62,38 @@ class PlacingCutter final : public Cutter {
   void cylinder(const WideVector& centre, const WideVector& axis, double radius, double half_length) override {
     round({false, in_world(centre), rotation_ * axis, radius, half_length, owner_});
   }
-  void face(const WidePlane& plane) override { wall(plane, owner_); }
-  void cut(const WidePlane& plane) override { wall(plane, slicing::kCut); }
+  void face(const WidePlane& plane) override {
+    if (!empty_) wall(placed(plane), owner_);
+  }
+  void cut(const WidePlane& plane) override {
+    if (!empty_) wall(placed(plane), slicing::kCut);
+  }
+  int place(const WidePlane& plane) override {
+    planes_->push_back(placed(plane));
+    return static_cast<int>(planes_->size()) - 1;
+  }
+  void face_beyond(int plane, double distance) override {
+    PlacedPlane moved = (*planes_)[plane];
+    moved.slack = moved.slack + DoubleDouble{distance};
+    wall(moved, owner_);
+  }
+  void cut_inside(int plane) override { wall((*planes_)[plane], slicing::kCut); }
+  void cut_outside(int plane) override {
+    const PlacedPlane& p = (*planes_)[plane];
+    wall({-p.normal, -p.slack, -p.most, -p.least}, slicing::kCut);
+  }
   void off(double flatness) override { result_.flatness = std::max(result_.flatness, flatness); }
   void gap(double volume, double area) override { result_.gaps += volume, result_.gap_area += area; }
 
   bool empty() const override { return empty_; }
   bool few() const override { return walls() - piece_.first_wall <= slicing::kMostLines / 2; }
-  bool beyond(const Plane& plane) const override { return common_ && side_of(plane) == Side::kBeyond; }
-  bool within(const Plane& plane) const override { return side_of(plane) == Side::kInside; }
+  std::pair<double, double> heights(const Plane& local) const override {
+    const Vec3 n = plain_rotation_ * local.normal;
+    const double slack = local.offset + dot(n, plain_origin_), margin = 4 * margin_;
+    if (!(std::abs(slack) <= extent_)) return {-extent_ - slack - margin, extent_ - slack + margin};
+    const auto [least, most] = range(n);
+    return {least - slack - margin, most - slack + margin};
+  }
 
   Bounds region(double wider_by) const override {
     if (!common_) return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
@@ -89,42 +115,33 @@ class PlacingCutter final : public Cutter {
     result_.rounds.push_back(r);
   }
 
-  void wall(const WidePlane& local, int owner) {
-    if (empty_) return;
+  /// A plane in the world, and the least and the largest dot(normal, X) over the region.
+  struct PlacedPlane {
+    WideVector normal;
+    DoubleDouble slack;
+    double least, most;
+  };
+  PlacedPlane placed(const WidePlane& local) const {
     const WideVector normal = rotation_ * local.normal;
-    const DoubleDouble slack = local.offset + dot(normal, origin_);
-    const Vec3 n = rounded(normal);
-    const double here = dot(n, inside_) + slack.head;
-    if (common_) {
-      cancellation_point(common_->corners.size());
-      const auto [least, most] = common_->range(n);
-      if (most < slack.head - margin_) return;
-      if (least > slack.head + margin_) {
-        empty_ = true;
-        return;
-      }
-    } else if (bounded(other_.shape)) {
-      if (dot(n, other_.support(n)) < here - margin_) return;
-      if (dot(n, other_.support(-n)) > here + margin_) {
-        empty_ = true;
-        return;
-      }
-    }
-    result_.walls.push_back({normal, slack, owner});
+    const auto [least, most] = range(rounded(normal));
+    return {normal, local.offset + dot(normal, origin_), least, most};
   }
 
-  /// The certain position of the region, by doubles.
-  enum class Side { kBeyond, kInside, kBoth };
-  Side side_of(const Plane& local) const {
-    const Vec3 n = plain_rotation_ * local.normal;
-    const double slack = local.offset + dot(n, plain_origin_), margin = 4 * margin_;
+  void wall(const PlacedPlane& plane, int owner) {
+    if (empty_ || plane.most < plane.slack.head - margin_) return;
+    empty_ = plane.least > plane.slack.head + margin_;
+    if (!empty_) result_.walls.push_back({plane.normal, plane.slack, owner});
+  }
+
+  /// The least and the largest dot(n, X) over the region.
+  std::pair<double, double> range(Vec3 n) const {
     if (common_) {
       cancellation_point(common_->corners.size());
-      const auto [least, most] = common_->range(n);
-      return least > slack + margin ? Side::kBeyond : most < slack - margin ? Side::kInside : Side::kBoth;
+      return common_->range(n);
     }
-    const bool below = bounded(other_.shape) && dot(n, other_.support(n)) < slack + dot(n, inside_) - margin;
-    return below ? Side::kInside : Side::kBoth;
+    if (!bounded(other_.shape)) return {-kInfinity, kInfinity};
+    const double here = dot(n, inside_);
+    return {dot(n, other_.support(-n)) - here, dot(n, other_.support(n)) - here};
   }
   const Placed& other_;
   const EnclosingPolytope* common_;
@@ -135,52 +152,12 @@ class PlacingCutter final : public Cutter {
   Mat3 plain_rotation_;
   Vec3 plain_origin_;
   Pieces& result_;
+  Scratch<std::vector<PlacedPlane>> planes_;
   double margin_ = 0;
+  double extent_;  ///< m: of the region from the inner point
   Piece piece_;
   bool empty_ = false;
 };
-
-/// Whether two unit normals are the same.
-bool same(const WideVector& a, const WideVector& b) { return norm2(overlapper::rounded(a - b)) < 1e-30; }
-
-/// Whether a piece is part of the prism on a facet. Such a piece lies beyond the facet of the core and below the face,
-/// within some lateral cuts.
-bool on_facet(std::span<const Wall> prism, const Wall& of_core, size_t sides) {
-  return prism.size() == 2 + sides && prism[0].owner == slicing::kCut && same(prism[0].normal, -of_core.normal) &&
-         prism[1].owner != slicing::kCut && same(prism[1].normal, of_core.normal);
-}
-
-/// Replaces all pieces by a flat one with the walls `first` and, if there are walls `second`, by one of the round. The
-/// lists hold copies, so they may come from the pieces.
-void become(Pieces& result, std::initializer_list<Wall> first, std::initializer_list<Wall> second) {
-  result.walls.assign(first), result.walls.insert(result.walls.end(), second);
-  result.pieces = {{-1, 0, static_cast<int>(first.size())}};
-  if (second.size() > 0) result.pieces.push_back({0, static_cast<int>(first.size()), static_cast<int>(second.size())});
-}
-
-void join_facet(Pieces& pieces) {
-  const std::span<const Wall> core = pieces.of(0), prism = pieces.of(1);
-  if (!pieces.rounds.empty() || core.size() != 1 || core[0].owner != slicing::kCut || !on_facet(prism, core[0], 0))
-    return;
-  become(pieces, {prism[1]}, {});
-}
-
-void join_edge(Pieces& pieces) {
-  constexpr double kLeastTurn = 1e-3, kMostTurn = 1.98;  // lengths of the difference of the two normals
-  const std::span<const Wall> core = pieces.of(0), first = pieces.of(1), second = pieces.of(2), wedge = pieces.of(3);
-  if (pieces.rounds.size() != 1 || pieces.rounds[0].ball || pieces.pieces[3].round != 0) return;
-  if (core.size() != 2 || wedge.size() != 2 || !on_facet(first, core[0], 1) || !on_facet(second, core[1], 1)) return;
-  const WideVector &of_first = first[2].normal, &of_second = second[2].normal;
-  const bool in_order = same(wedge[0].normal, -of_first) && same(wedge[1].normal, -of_second);
-  if (!in_order && !(same(wedge[1].normal, -of_first) && same(wedge[0].normal, -of_second))) return;
-  const Wall &one = first[1], &other = second[1];
-  const double turn = norm(overlapper::rounded(one.normal - other.normal));
-  if (!(turn > kLeastTurn && turn < kMostTurn)) return;
-  const Round& round = pieces.rounds[0];
-  const WideVector normal = unit(one.normal + other.normal);
-  const DoubleDouble slack = dot(normal, round.centre) + DoubleDouble{round.radius} * dot(normal, one.normal);
-  become(pieces, {one, other, {normal, slack, slicing::kCut}}, {{-normal, -slack, slicing::kCut}});
-}
 
 }  // namespace
 
@@ -196,6 +173,7 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
   const double margin = 1e-12 * (norm(size) + norm(inside) + norm(a.pose.translation) + norm(b.pose.translation));
   const Vec3 wider = margin * Vec3{1, 1, 1};
   result.become({lower - wider, upper + wider});
+  const double farthest = result.extent();
   thread_local std::vector<EnclosingPolytope::Face> planes;
   planes.clear();
   for (const Placed* body : {&a, &b}) {
@@ -203,7 +181,8 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
     const auto add = [&](const Plane& plane, double more) {
       cancellation_point();
       const Vec3 normal = body->pose.rotation * plane.normal;
-      planes.push_back({normal, plane.offset + dot(normal, origin) + more + margin, kNoWall});
+      const double slack = plane.offset + dot(normal, origin) + more + margin;
+      if (slack < farthest) planes.push_back({normal, slack, kNoWall});
     };
     if (const HullData* hull = polytope_of(body->shape)) {
       const double more = core_radius(body->shape) + hull->flatness;
@@ -227,9 +206,10 @@ void cut(const Placed& body, const Placed& other, const EnclosingPolytope* commo
   ask(body.shape, [&](const auto& shape) { shape.give_pieces(cutter); });
 }
 
-void join(Pieces& pieces) {
-  if (pieces.pieces.size() == 2) join_facet(pieces);
-  if (pieces.pieces.size() == 4) join_edge(pieces);
+bool cut_mitred(const Placed& body, const Placed& other, const EnclosingPolytope& common, int owner, Vec3 reference,
+                const WideVector& inside, Pieces& result) {
+  PlacingCutter cutter(body, other, &common, owner, reference, inside, result);
+  return ask(body.shape, [&](const auto& shape) { return shape.give_mitred(cutter); });
 }
 
 bool grow(Pieces& pieces, double outwards) {

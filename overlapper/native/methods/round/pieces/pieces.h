@@ -50,10 +50,11 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
 void cut(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
          const WideVector& inside, Pieces& result);
 
-/// Joins pieces of a rounded hull if the remaining walls belong to one facet or one edge. Fewer pieces then make the
-/// same set. For a facet, this is everything below the facet. For an edge, it is everything below the plane through the
-/// lines where the cylinder meets both facets, and the segment of the cylinder beyond that plane.
-void join(Pieces& pieces);
+/// Gives the mitred offset of a rounded hull, or a polytope, as the first piece. Each further piece is the part of it
+/// over an edge or a vertex, with the round that belongs there: outside the round, it is not in the body. False for
+/// other bodies.
+bool cut_mitred(const Placed& body, const Placed& other, const EnclosingPolytope& common, int owner, Vec3 reference,
+                const WideVector& inside, Pieces& result);
 
 /// Moves the surface of a body out, but not the cuts through the body; false if nothing of a round shape is left.
 bool grow(Pieces& pieces, double outwards);

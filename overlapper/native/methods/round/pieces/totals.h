@@ -30,6 +30,19 @@ struct Totals : Moments {
     pull += piece.pull, moment += piece.moment, unbalanced += piece.unbalanced;
   }
 
+  /// Adds more - less, which both contain this already. Errors of both add up.
+  void add_difference(const Totals& more, const Totals& less) {
+    const auto sum = [](auto& of, const auto& plus, const auto& minus) { of = of + (plus - minus); };
+    const auto errors = [](double& of, double plus, double minus) { of = plus + (minus - of); };
+    sum(volume, more.volume, less.volume), sum(first, more.first, less.first);
+    sum(squares, more.squares, less.squares), sum(products, more.products, less.products);
+    sum(area, more.area, less.area), sum(first_area, more.first_area, less.first_area);
+    sum(pull, more.pull, less.pull), sum(moment, more.moment, less.moment);
+    sum(unbalanced, more.unbalanced, less.unbalanced);
+    errors(error, more.error, less.error), errors(area_error, more.area_error, less.area_error);
+    errors(border, more.border, less.border), errors(open, more.open, less.open);
+  }
+
   /// Adds to the area if the surface belongs to a body, and not to a cut.
   void add_area(int owner, double more) {
     if (owner != slicing::kCut) area += more;
