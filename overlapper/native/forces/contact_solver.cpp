@@ -51,7 +51,7 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
   bodies_.place(frames);
   mobilities_.assign(bodies_.bodies().size(), {});
   for (size_t i = 0; i < mobilities_.size(); ++i) {
-    if (bodies_.bodies()[i].links > 1 || !bodies_.bodies()[i].movable) continue;
+    if (bodies_.bodies()[i].links != 1 || !bodies_.bodies()[i].movable) continue;
     const std::span<const double> m = bodies_.inverse_mass(int(i));
     mobilities_[i] = {m[0], {{m[21], m[22], m[23]}, {m[27], m[28], m[29]}, {m[33], m[34], m[35]}}};
   }
@@ -132,7 +132,7 @@ void ContactSolver::add_side(Row& row, int number, std::span<const double> jacob
   row.sides[row.sides_used++] = {number, body.first_coordinate, body.coordinates, body.movable, false, 1, {},
                                  first,  first + 6 * n};
   pool_.resize(first + 12 * n);
-  double *rows = &pool_[first], *answers = rows + 6 * n;
+  double *rows = pool_.data() + first, *answers = rows + 6 * n;
   for (size_t c = 0; c < n; ++c) {
     const auto at = [&](size_t r) { return jacobian[r * n + c]; };
     const Six slip = row.local({{at(0), at(1), at(2)}, {at(3), at(4), at(5)}});
@@ -161,14 +161,14 @@ ContactSolver::Six ContactSolver::slip_of(const Row& row, std::span<const double
   Screw single{};
   for (int s = 0; s < row.sides_used; ++s) {
     const Side& side = row.sides[s];
-    const double* v = &velocity[side.first];
+    const double* v = velocity.data() + side.first;
     if (side.single) {
       const Vec3 about{v[3], v[4], v[5]};
       single.along += side.sign * (Vec3{v[0], v[1], v[2]} + cross(about, side.arm));
       single.about += side.sign * about;
       continue;
     }
-    const double* rows = &pool_[side.rows];
+    const double* rows = pool_.data() + side.rows;
     const int n = side.coordinates;
     for (int i = 0; i < 3; ++i)
       for (int c = 0; c < n; ++c) {
@@ -258,7 +258,7 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
 
 ContactSolver::Solution ContactSolver::solved(std::span<const Laws> laws, std::span<const double> velocity) const {
   Solution solution;
-  solution.links.assign(bodies_.links().size(), {Vec3{}, Vec3{}});
+  solution.links.assign(bodies_.links(), {Vec3{}, Vec3{}});
   solution.acceleration.assign(velocity.size(), 0);
   for (size_t i = 0; i < laws.size(); ++i) {
     const ElasticPatch& patch = patches_[i];

@@ -23,8 +23,9 @@ struct PatchForce {
 /// Gauss–Seidel).
 class ContactSolver {
  public:
-  explicit ContactSolver(std::vector<TreeLink> links) : bodies_(std::move(links)) {}
+  explicit ContactSolver(Multibodies bodies) : bodies_(std::move(bodies)) {}
 
+  Multibodies& bodies() { return bodies_; }
   const Multibodies& bodies() const { return bodies_; }
   std::span<const ElasticPatch> patches() const { return patches_; }
 

@@ -10,6 +10,8 @@ namespace {
 
 constexpr int kOfBase = 6;
 
+constexpr int kMostCoordinates = 1 << 20;
+
 constexpr std::array<Vec3, 3> kAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 
 int coordinates_of(Joint joint) {
@@ -76,9 +78,44 @@ Multibodies::Multibodies(std::vector<TreeLink> links) : links_(std::move(links))
     body.coordinates += own;
     coordinates_ += own;
   }
+  make_room();
+}
+
+Multibodies::Multibodies(std::span<const std::int64_t> coordinates, std::vector<MovedLink> links)
+    : links_(links.size()) {
+  for (const std::int64_t own : coordinates) {
+    if (own < 0 || own > kMostCoordinates) throw std::invalid_argument("coordinates must be numbers from 0");
+    bodies_.push_back({0, 0, coordinates_, int(own), own > 0});
+    coordinates_ += int(own);
+  }
+  const int still = int(bodies_.size());
+  bodies_.push_back({0, 0, coordinates_, 0, false});
+  for (MovedLink& link : links) {
+    if (link.tree < -1 || link.tree >= still) throw std::invalid_argument("trees must be numbers of trees, or -1");
+    body_.push_back(link.tree < 0 ? still : link.tree);
+    const int own = bodies_[body_.back()].coordinates;
+    for (int each : link.moved)
+      if (each < 0 || each >= own) throw std::invalid_argument("moved must be coordinates of the link's tree");
+    moved_.push_back(std::move(link.moved));
+  }
+  make_room();
+}
+
+void Multibodies::make_room() {
   frames_.resize(links_.size());
-  moving_.resize(coordinates_);
+  motions_.resize(coordinates_);
   for (const Body& body : bodies_) inverse_mass_.emplace_back(size_t(body.coordinates) * body.coordinates);
+}
+
+void Multibodies::move(std::vector<Motion> motions, std::span<const double> inverse_mass, int width) {
+  motions_ = std::move(motions);
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    const Body& body = bodies_[i];
+    for (int row = 0; row < body.coordinates; ++row) {
+      const double* from = &inverse_mass[size_t(body.first_coordinate + row) * width];
+      std::copy_n(from, body.coordinates, &inverse_mass_[i][size_t(row) * body.coordinates]);
+    }
+  }
 }
 
 void Multibodies::place(std::span<const Pose> frames) {
@@ -89,14 +126,14 @@ void Multibodies::place(std::span<const Pose> frames) {
     for (int k = 0; k < own; ++k) {
       const int coordinate = moved_[i][moved_[i].size() - own + k];
       const Pose& parent = frames_[link.parent];
-      const bool spherical = link.joint == Joint::kSpherical;
+      const bool spherical = link.joint == Joint::kSpherical, slides = link.joint == Joint::kPrismatic;
       const Vec3 axis = spherical ? frames_[i].rotation * kAxes[k] : parent.rotation * link.axis;
-      moving_[bodies_[body_[i]].first_coordinate + coordinate] = {link.joint != Joint::kPrismatic, axis,
-                                                                  parent * link.pivot};
+      motions_[bodies_[body_[i]].first_coordinate + coordinate] = {slides ? axis : Vec3{}, slides ? Vec3{} : axis,
+                                                                   parent * link.pivot};
     }
   }
   for (int body = 0; body < int(bodies_.size()); ++body)
-    if (bodies_[body].movable) find_inverse_mass(body);
+    if (bodies_[body].movable && bodies_[body].links > 0) find_inverse_mass(body);
 }
 
 void Multibodies::jacobian(int link, Vec3 point, std::span<double> rows) const {
@@ -109,27 +146,29 @@ void Multibodies::jacobian(int link, Vec3 point, std::span<double> rows) const {
       rows[size_t(axis + 3) * n + column] = angular[axis];
     }
   };
-  const Vec3 arm = point - frames_[body.first_link].translation;
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; body.links > 0 && k < 3; ++k) {
     put(k, kAxes[k], {});
-    put(3 + k, cross(kAxes[k], arm), kAxes[k]);
+    put(3 + k, cross(kAxes[k], point - frames_[body.first_link].translation), kAxes[k]);
   }
   for (int column : moved_[link]) {
-    const Moving& by = moving_[body.first_coordinate + column];
-    if (by.turns) put(column, cross(by.axis, point - by.pivot), by.axis);
-    else put(column, by.axis, {});
+    const Motion& by = motions_[body.first_coordinate + column];
+    put(column, by.linear + cross(by.angular, point - by.point), by.angular);
   }
 }
 
 std::array<Vec3, 2> Multibodies::twist(int link, std::span<const double> velocity) const {
   const Body& body = bodies_[body_[link]];
-  const double* v = &velocity[body.first_coordinate];
-  const Vec3 spin{v[3], v[4], v[5]}, centre = frames_[link].translation;
-  Vec3 linear = Vec3{v[0], v[1], v[2]} + cross(spin, centre - frames_[body.first_link].translation), angular = spin;
+  const double* v = velocity.data() + body.first_coordinate;
+  const Vec3 centre = frames_[link].translation;
+  Vec3 linear, angular;
+  if (body.links > 0) {
+    angular = {v[3], v[4], v[5]};
+    linear = Vec3{v[0], v[1], v[2]} + cross(angular, centre - frames_[body.first_link].translation);
+  }
   for (int column : moved_[link]) {
-    const Moving& by = moving_[body.first_coordinate + column];
-    linear += v[column] * (by.turns ? cross(by.axis, centre - by.pivot) : by.axis);
-    if (by.turns) angular += v[column] * by.axis;
+    const Motion& by = motions_[body.first_coordinate + column];
+    linear += v[column] * (by.linear + cross(by.angular, centre - by.point));
+    angular += v[column] * by.angular;
   }
   return {linear, angular};
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -21,25 +22,47 @@ struct TreeLink {
   Vec3 inertia;     ///< kg m², principal
 };
 
+/// The motion of links per unit of a coordinate, in the world: a velocity at a point, and an angular velocity.
+struct Motion {
+  Vec3 linear, angular, point;
+};
+
+/// A link whose motion a simulator knows: its tree, -1 for a link that stands still, and the coordinates that move it,
+/// among those of the tree.
+struct MovedLink {
+  int tree = -1;
+  std::vector<int> moved;
+};
+
 /// Bodies of links, and their velocity coordinates. A body has six coordinates of its base, in the world: linear at the
 /// centre of mass, and angular. The coordinates of its joints follow, in the order of their links. A fixed base also
 /// has six coordinates, because it may be moved by hand.
+///
+/// Bodies may also be trees of a simulator that knows masses and motions itself. They have the simulator's coordinates.
 class Multibodies {
  public:
   struct Body {
-    int first_link, links, first_coordinate, coordinates;
-    bool movable;  ///< by forces
+    int first_link, links, first_coordinate, coordinates;  ///< a tree of a simulator has no `links`
+    bool movable;                                          ///< by forces
   };
 
   /// Throws std::invalid_argument unless parents come before their children.
   explicit Multibodies(std::vector<TreeLink> links);
 
-  std::span<const TreeLink> links() const { return links_; }
+  /// Trees of a simulator, with their numbers of coordinates. The coordinates of a tree are successive. Throws
+  /// std::invalid_argument if a link has a tree or a coordinate that does not exist.
+  Multibodies(std::span<const std::int64_t> coordinates, std::vector<MovedLink> links);
+
+  int links() const { return int(links_.size()); }
   std::span<const Body> bodies() const { return bodies_; }
   int body_of(int link) const { return body_[link]; }
   int coordinates() const { return coordinates_; }
 
-  /// Takes the poses of the links, and finds the inverse mass matrices there.
+  /// Takes the motions by all coordinates of trees, and the inverse mass matrices. These have a row of `width` numbers
+  /// for each coordinate, which begins with the coordinates of its tree.
+  void move(std::vector<Motion> motions, std::span<const double> inverse_mass, int width);
+
+  /// Takes the poses of the links, and finds the inverse mass matrices there unless a simulator knows them.
   void place(std::span<const Pose> frames);
 
   Vec3 centre(int link) const { return frames_[link].translation; }
@@ -54,21 +77,16 @@ class Multibodies {
   std::span<const double> inverse_mass(int body) const { return inverse_mass_[body]; }
 
  private:
-  /// A joint coordinate, in the world.
-  struct Moving {
-    bool turns;
-    Vec3 axis, pivot;
-  };
-
+  void make_room();
   void find_inverse_mass(int body);
 
   std::vector<TreeLink> links_;
   std::vector<Body> bodies_;
   std::vector<int> body_;                ///< per link
-  std::vector<std::vector<int>> moved_;  ///< per link: the coordinates of the joints between it and its base
+  std::vector<std::vector<int>> moved_;  ///< per link: the coordinates of its body that move it, without the base
   int coordinates_ = 0;
   std::vector<Pose> frames_;
-  std::vector<Moving> moving_;  ///< per coordinate of all bodies; not used for bases
+  std::vector<Motion> motions_;  ///< per coordinate of all bodies; not used for bases
   std::vector<std::vector<double>> inverse_mass_;
 };
 

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <climits>
+
 #include "batch/batch.h"
 #include "forces/contact_solver.h"
 #include "python/arrays.h"
@@ -30,7 +33,36 @@ ContactSolver to_solver(nb::handle parents_given, nb::handle joints_given, nb::h
     if (joints[i] < 0 || joints[i] > int(Joint::kSpherical)) fail("joints", "must be from 0 to 3");
     links[i] = {int(parents[i]), Joint(joints[i]), axes[i], pivots[i], masses[i], inertias[i]};
   }
-  return ContactSolver(std::move(links));
+  return ContactSolver(Multibodies(std::move(links)));
+}
+
+/// `moved` has a row of each coordinate that moves a link: the place of the link, and the coordinate within its tree.
+ContactSolver of_trees(nb::handle coordinates_given, nb::handle trees_given, nb::handle moved_given) {
+  const auto coordinates = to_indices(coordinates_given, "coordinates"), trees = to_indices(trees_given, "trees"),
+             moved = to_indices(moved_given, "moved", 2);
+  const auto within = [](std::int64_t number) { return int(std::clamp<std::int64_t>(number, -2, INT_MAX)); };
+  std::vector<MovedLink> links;
+  for (std::int64_t tree : trees) links.push_back({within(tree), {}});
+  for (size_t i = 0; i < moved.size(); i += 2) {
+    if (moved[i] < 0 || moved[i] >= std::int64_t(links.size())) fail("moved", "must begin with places of links");
+    links[moved[i]].moved.push_back(within(moved[i + 1]));
+  }
+  return ContactSolver(Multibodies(coordinates, std::move(links)));
+}
+
+void move(ContactSolver& solver, nb::handle linear_given, nb::handle angular_given, nb::handle points_given,
+          nb::handle inverse_mass_given) {
+  const size_t count = solver.bodies().coordinates();
+  const std::vector<Vec3> linear = to_rows(linear_given, "linear"), angular = to_rows(angular_given, "angular"),
+                          points = to_rows(points_given, "points");
+  if (linear.size() != count || angular.size() != count || points.size() != count)
+    fail("motions", "must have a row for each coordinate in each array");
+  size_t width = 0;
+  for (const Multibodies::Body& body : solver.bodies().bodies()) width = std::max(width, size_t(body.coordinates));
+  const std::vector<double> inverse_mass = numbers(inverse_mass_given, "inverse_mass", count, width);
+  std::vector<Motion> motions;
+  for (size_t i = 0; i < count; ++i) motions.push_back({linear[i], angular[i], points[i]});
+  solver.bodies().move(std::move(motions), inverse_mass, int(width));
 }
 
 nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps& found, nb::handle links_given,
@@ -40,7 +72,7 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
     const Frame frame = to_frame(each);
     frames.push_back(make_placed(Sphere(1), frame.position, frame.orientation).pose);
   }
-  const size_t count = found.size(), links = solver.bodies().links().size();
+  const size_t count = found.size(), links = size_t(solver.bodies().links());
   if (frames.size() != links) fail("frames", "must be one for each link");
   const auto link_of = to_indices(links_given, "links");
   const auto stiffness = numbers(stiffness_given, "stiffness", count);
@@ -115,7 +147,7 @@ nb::tuple ahead(const ContactSolver& solver, double duration, nb::handle velocit
   std::vector<double> positions = numbers(positions_given, "positions", k, 3);
   std::vector<double> orientations = numbers(orientations_given, "orientations", k, 4);
   for (size_t i = 0; i < k; ++i) {
-    if (links[i] < 0 || links[i] >= std::int64_t(bodies.links().size())) fail("links", "must be places of links");
+    if (links[i] < 0 || links[i] >= bodies.links()) fail("links", "must be places of links");
     const int link = int(links[i]);
     const auto [linear, angular] = bodies.twist(link, velocity);
     double *p = &positions[3 * i], *q = &orientations[4 * i];
@@ -153,6 +185,24 @@ the world, then of its joints.)");
               "numpy.typing.ArrayLike, pivots: numpy.typing.ArrayLike, masses: numpy.typing.ArrayLike, inertias: "
               "numpy.typing.ArrayLike) -> None"));
   cls.def_prop_ro("coordinates", [](const ContactSolver& self) { return self.bodies().coordinates(); });
+  cls.def_static(
+      "of_trees", &of_trees, "coordinates"_a, "trees"_a, "moved"_a,
+      nb::sig("def of_trees(coordinates: numpy.typing.ArrayLike, trees: numpy.typing.ArrayLike, moved: "
+              "numpy.typing.ArrayLike) -> ContactSolver"),
+      R"(A solver for trees of a simulator that knows masses and motions itself and gives them to `move`.
+
+`coordinates` (t,) are the numbers of coordinates of the trees. `trees` (n,) is the tree of each link, -1 of a link that
+stands still. `moved` (m, 2) has a row for each coordinate that moves a link: the place of the link, and the place of
+the coordinate in the tree.)");
+  cls.def(
+      "move", &move, "linear"_a, "angular"_a, "points"_a, "inverse_mass"_a,
+      nb::sig("def move(self, linear: numpy.typing.ArrayLike, angular: numpy.typing.ArrayLike, points: "
+              "numpy.typing.ArrayLike, inverse_mass: numpy.typing.ArrayLike) -> None"),
+      R"(Take the motions and the masses of trees, before `place`.
+
+A unit of a coordinate moves its links by a row of each of three (c, 3) arrays: the velocity at a point, the angular
+velocity, and that point, in the world. `inverse_mass` (c, w) has a row for each coordinate. The row begins with the
+numbers for the coordinates of its tree; w is the size of the largest tree.)");
   cls.def(
       "copy", [](const ContactSolver& self) { return self; }, nb::sig("def copy(self) -> ContactSolver"),
       "Another one that knows the same of the last step: what it solves changes nothing here.");

@@ -1236,6 +1236,25 @@ class ContactSolver:
     @property
     def coordinates(self) -> int: ...
 
+    @staticmethod
+    def of_trees(coordinates: numpy.typing.ArrayLike, trees: numpy.typing.ArrayLike, moved: numpy.typing.ArrayLike) -> ContactSolver:
+        """
+        A solver for trees of a simulator that knows masses and motions itself and gives them to `move`.
+
+        `coordinates` (t,) are the numbers of coordinates of the trees. `trees` (n,) is the tree of each link, -1 of a link that
+        stands still. `moved` (m, 2) has a row for each coordinate that moves a link: the place of the link, and the place of
+        the coordinate in the tree.
+        """
+
+    def move(self, linear: numpy.typing.ArrayLike, angular: numpy.typing.ArrayLike, points: numpy.typing.ArrayLike, inverse_mass: numpy.typing.ArrayLike) -> None:
+        """
+        Take the motions and the masses of trees, before `place`.
+
+        A unit of a coordinate moves its links by a row of each of three (c, 3) arrays: the velocity at a point, the angular
+        velocity, and that point, in the world. `inverse_mass` (c, w) has a row for each coordinate. The row begins with the
+        numbers for the coordinates of its tree; w is the size of the largest tree.
+        """
+
     def copy(self) -> ContactSolver:
         """
         Another one that knows the same of the last step: what it solves changes nothing here.

@@ -17,9 +17,18 @@ def solver_of(*bodies):
     return _core.ContactSolver([-1] * count, [0] * count, np.zeros((count, 3)), np.zeros((count, 3)), masses, inertias)
 
 
-def placed(depth, dissipation=0.0, friction=0.0):
+def cube_as_a_tree():
+    """The solver of a held and a free body, with the free one as a tree whose motions and masses are given."""
+    solver = _core.ContactSolver.of_trees([6], [-1, 0], [(1, k) for k in range(6)])
+    still = np.zeros((3, 3))
+    inverse = np.diag([1.0] * 3 + [600.0] * 3)
+    solver.move(np.vstack([np.eye(3), still]), np.vstack([still, np.eye(3)]), np.tile([0, 0, HALF], (6, 1)), inverse)
+    return solver
+
+
+def placed(depth, dissipation=0.0, friction=0.0, solver=None):
     """A cube that has sunk into a half-space, and the squares of frequencies."""
-    solver = solver_of(HELD, FREE)
+    solver = solver or solver_of(HELD, FREE)
     poses = [(0, 0, 0), (0, 0, HALF - depth)]
     found = overlaps([HalfSpace([0, 0, 1], 0), Box([HALF] * 3)], poses, [TURN] * 2, [(0, 1)])
     frames = [(pose, TURN) for pose in poses]
@@ -65,6 +74,78 @@ def test_links_go_on_as_they_move():
     turned = 0.1
     assert positions[1] == pytest.approx([2 + 0.5 * np.cos(turned), 0.2 * 3.5 + 0.5 * np.sin(turned), 0])
     assert orientations[1] == pytest.approx([0, 0, np.sin(turned / 2), np.cos(turned / 2)])
+
+
+def test_a_tree_with_given_masses_moves_as_the_body_with_these_masses():
+    """The given motions are about a point 0.3 m above the centre, which changes the velocities to give."""
+    body, square = placed(1e-4, 1e-3, 0.4)
+    tree = cube_as_a_tree()
+    shift = np.eye(6)
+    shift[:3, 3:] = [[0, 0.3, 0], [-0.3, 0, 0], [0, 0, 0]]  # the velocity of a point above by a rotation
+    inverse = shift @ np.diag([1.0] * 3 + [600.0] * 3) @ shift.T
+    above = np.tile([0, 0, HALF - 1e-4 + 0.3], (6, 1))
+    tree.move(np.vstack([np.eye(3), np.zeros((3, 3))]), np.vstack([np.zeros((3, 3)), np.eye(3)]), above, inverse)
+    _, same = placed(1e-4, 1e-3, 0.4, tree)
+    assert same == pytest.approx(square, rel=1e-12)
+    rng = np.random.default_rng(5)
+    velocity, acceleration = rng.normal(scale=0.1, size=(2, 6))
+    of_body = body.solve(1e-3, [0] * 6 + [*velocity], [0] * 6 + [*acceleration], [False], False)
+    of_tree = tree.solve(1e-3, shift @ velocity, shift @ acceleration, [False], False)
+    for ours, theirs in zip(of_tree[:3], of_body[:3]):
+        assert ours == pytest.approx(theirs, rel=1e-10, abs=1e-12)
+    assert of_tree[5] == pytest.approx(of_body[5], rel=1e-10, abs=1e-12)
+    assert of_tree[6] == pytest.approx(shift @ of_body[6][6:], rel=1e-10) and of_tree[6].all()
+    at = np.array([0, 1]), [(0, 0, 0), (0, 0, HALF)], [TURN] * 2
+    for ours, theirs in zip(tree.ahead(0.1, shift @ velocity, *at), body.ahead(0.1, [0] * 6 + [*velocity], *at)):
+        assert ours == pytest.approx(theirs, rel=1e-12, abs=1e-15)
+
+
+def test_links_of_one_tree_push_each_other_through_their_common_masses():
+    """A mass of 1 kg on a slide, on a mass of 3 kg on a slide: the first coordinate moves both, the second one alone."""
+    tree = _core.ContactSolver.of_trees([2], [0, 0], [(0, 0), (1, 0), (1, 1)])
+    up, still = np.tile([0, 0, 1], (2, 1)), np.zeros((2, 3))
+    inverse = np.linalg.inv([[4, 1], [1, 1]])
+    tree.move(up, still, still, inverse)
+    placed(1e-4, solver=tree)
+    force, *_, ours, _sweeps = tree.solve(1e-3, [0, 0], [0, 0], [False], False)
+    pressing = -force[0, 2]
+    assert pressing > 9 and ours == pytest.approx([-pressing / 3, pressing * (1 + 1 / 3)], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"coordinates": [-1]}, "coordinates must be numbers from 0"),
+        ({"coordinates": [2**40]}, "coordinates must be numbers from 0"),
+        ({"trees": [-2, 0]}, "trees must be numbers of trees, or -1"),
+        ({"trees": [0, 1]}, "trees must be numbers of trees, or -1"),
+        ({"trees": [0, 2**40]}, "trees must be numbers of trees, or -1"),
+        ({"moved": [(2, 0)]}, "moved must begin with places of links"),
+        ({"moved": [(-1, 0)]}, "moved must begin with places of links"),
+        ({"moved": [(1, 6)]}, "moved must be coordinates of the link's tree"),
+        ({"moved": [(0, 0)]}, "moved must be coordinates of the link's tree"),
+        ({"moved": [(1, -1)]}, "moved must be coordinates of the link's tree"),
+    ],
+)
+def test_invalid_trees_are_refused(wrong, said):
+    given = {"coordinates": [6], "trees": [-1, 0], "moved": [(1, 0)]}
+    with pytest.raises(ValueError, match=f"^{said}$"):
+        _core.ContactSolver.of_trees(**(given | wrong))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"linear": np.zeros((5, 3))}, "motions must have a row for each coordinate in each array"),
+        ({"angular": np.zeros((7, 3))}, "motions must have a row for each coordinate in each array"),
+        ({"points": np.zeros((0, 3))}, "motions must have a row for each coordinate in each array"),
+        ({"inverse_mass": np.zeros((6, 5))}, "inverse_mass must have 36 numbers, not 30"),
+    ],
+)
+def test_invalid_motions_are_refused(wrong, said):
+    given = {**dict.fromkeys(("linear", "angular", "points"), np.zeros((6, 3))), "inverse_mass": np.eye(6)}
+    with pytest.raises(ValueError, match=f"^{said}$"):
+        cube_as_a_tree().move(**(given | wrong))
 
 
 @pytest.mark.parametrize(
