@@ -5,9 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from overlapper._core import ContactSolver
 from overlapper.simulation.layout import Pose
 from overlapper.simulation.model import Array, LinkKey
+
+
+class OtherForces(Protocol):
+    """The accelerations of all coordinates by everything except contacts: gravity, motors, constraints."""
+
+    def ahead(self, velocity: Array, duration: float) -> Array:
+        """Return the velocity after a duration (s), if it keeps changing as it does now."""
+
+    def learnt(self, velocity: Array) -> Array:
+        """Return the acceleration by everything except contacts, now that the coordinates have this velocity."""
+
+    def solved(self, velocity: Array, duration: float, ours: Array) -> None:
+        """Record that from this velocity on, contacts accelerate the coordinates by `ours` for a duration (s)."""
+
+    def left_at(self, velocity: Array) -> None:
+        """Record that a step has ended with this velocity."""
 
 
 class Dynamics(Protocol):
@@ -25,22 +44,20 @@ class Dynamics(Protocol):
     def place(self) -> Mapping[LinkKey, int]:
         """The index of each link in `links`."""
 
-    @property
-    def friction(self) -> Array:
-        """(n,) the coefficient of friction of each link."""
+    def friction(self, pairs: NDArray[np.int64]) -> Array:
+        """(p,) the simulator's coefficients of friction of `pairs` (p, 2), which are pairs of indices in `links`."""
 
     def read(self) -> bool:
         """Read masses and friction again. True if masses have changed, so that there is a new solver."""
 
-    @property
-    def gravity(self) -> Array:
-        """The acceleration of all coordinates that is known before any motion."""
+    def other_forces(self) -> OtherForces:
+        """The forces that do not come from contacts, of which nothing is known yet but gravity."""
 
     def frames(self) -> Sequence[Pose]:
-        """The inertial frames of `links`, now."""
+        """The inertial frames of `links`, now. A simulator that knows its masses gives them to the solver."""
 
     def velocity(self) -> Array:
-        """The velocities of all coordinates: of bases in m/s and rad/s, in the world, and of joints in rad/s or m/s."""
+        """The velocities of all coordinates, in the order of the solver."""
 
     def apply(self, wrenches: Array, frames: Sequence[Pose]) -> None:
         """Apply forces and torques (n, 6), about the origins of `frames`, to `links` in the next step."""
@@ -64,6 +81,12 @@ class Mechanics(Protocol):
 
     def leave(self) -> None:
         """Restore the simulator to its settings before `enter`."""
+
+    def pose(self) -> None:
+        """Bring the poses up to date with the state of the simulation."""
+
+    def prepare(self) -> None:
+        """Bring up to date whatever a substep begins with: poses, masses and other forces."""
 
     def begin(self, length: float, duration: float, first: bool) -> None:
         """Prepare a substep of `length` (s), the `first` or a later one, of a time step of `duration` (s)."""

@@ -14,6 +14,7 @@ from overlapper import _core
 from overlapper.quaternion import rotated
 from overlapper.simulation.bullet.calls import unheard
 from overlapper.simulation.bullet.joints import joint_between
+from overlapper.simulation.bullet.other_forces import LearntForces
 from overlapper.simulation.model import BASE, Array
 
 # By kinematic_tree.Kind: the number that _core.ContactSolver knows it by, and how many coordinates it has.
@@ -25,7 +26,7 @@ HELD = (-1, 0, np.zeros(3), np.zeros(3))  # a base: no parent, no joint
 class BulletDynamics:
     """See `Dynamics`: the links of some bodies, base by base, and the `solver` that knows their masses and joints.
 
-    `links` are (body, link) in the solver's order, and `place` is the index of each. `friction` (n,) has coefficients.
+    `links` are (body, link) in the solver's order, and `place` is the index of each.
     """
 
     def __init__(self, client: int, bodies: Sequence[int]) -> None:
@@ -34,13 +35,13 @@ class BulletDynamics:
         self.links = [(id, link) for id, joints in self._joints.items() for link in (BASE, *joints)]
         self.place = {each: k for k, each in enumerate(self.links)}
         self._masses: list[Any] = [None]  # equals no real list of masses, so that the first `read` makes a solver
-        self.friction: Array = np.zeros(len(self.links))
+        self._friction: Array = np.zeros(len(self.links))
         self.read()
 
     def read(self) -> bool:
         """Read masses and friction again. True if a mass or inertia has changed, so that there is a new solver."""
         told = [pybullet.getDynamicsInfo(id, link, self._client) for id, link in self.links]
-        self.friction = np.array([each[FRICTION] for each in told])
+        self._friction = np.array([each[FRICTION] for each in told])
         masses = [(each[MASS], each[INERTIA]) for each in told]
         if masses == self._masses:
             return False
@@ -48,16 +49,19 @@ class BulletDynamics:
         self._model()
         return True
 
-    @property
-    def gravity(self) -> Array:
-        """The acceleration of all coordinates that is known before any motion: gravity on free bases."""
+    def friction(self, pairs: NDArray[np.int64]) -> Array:
+        """(p,) the products of the two links' lateralFriction."""
+        return np.asarray(self._friction[pairs].prod(axis=1))
+
+    def other_forces(self) -> LearntForces:
+        """Forces of which only gravity on free bases is known before any motion."""
         told = pybullet.getPhysicsEngineParameters(self._client)
         down = [told[f"gravityAcceleration{axis}"] for axis in "XYZ"]
         found = np.zeros(self.solver.coordinates)
         for (id, _), first in self._bases.items():
             if self._masses[self.place[id, BASE]][MASS] > 0:
                 found[first : first + 3] = down
-        return found
+        return LearntForces(found)
 
     def _model(self) -> None:
         client = self._client

@@ -63,6 +63,11 @@ class Stepping:
             self._response.turn_on(self._recorder)
             self._commands.prepare(time_step(self._client), first=True)
 
+    def pose(self) -> None:
+        return  # poses are always up to date
+
+    prepare = pose
+
     def begin(self, length: float, duration: float, first: bool) -> None:
         pybullet.setTimeStep(length, self._client)
         self._commands.prepare(length, first, share=length / duration)

@@ -13,7 +13,6 @@ from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.forces.coming import coming, followed
 from overlapper.simulation.forces.forces import Forces, mean
 from overlapper.simulation.forces.masses import Masses
-from overlapper.simulation.forces.other_forces import OtherForces
 from overlapper.simulation.forces.parameter import Layers, OfPair
 from overlapper.simulation.forces.told import Told
 from overlapper.simulation.model import Array
@@ -156,6 +155,7 @@ class VolumetricContact:
                 "step() must be called within `with contact:`, where Bullet does not push these pairs apart"
             )
         duration = self.bodies.time_step
+        self._mechanics.prepare()
         self._refresh()
         left, taken = duration, 0
         length = duration / (self._planned or 1)
@@ -163,6 +163,7 @@ class VolumetricContact:
         try:
             while left > 1e-9 * duration:
                 if taken:
+                    self._mechanics.prepare()
                     self._follow()
                 velocity, lost = self._velocity()
                 frequency2 = self._place(lost)
@@ -194,6 +195,7 @@ class VolumetricContact:
         Forces
             A row for each pair of shapes that overlaps.
         """
+        self._mechanics.prepare()
         self._refresh()
         velocity, lost = self._velocity()
         frequency2 = self._place(lost)
@@ -214,6 +216,7 @@ class VolumetricContact:
         Forces
             `slip` is that at the end of the step.
         """
+        self._mechanics.pose()
         self._follow()
         contacts = self.bodies.overlaps(pairs=self._among)
         return mean(contacts, self._parts, self._masses.stiffness(contacts.overlaps))
@@ -305,7 +308,7 @@ class VolumetricContact:
         if self._masses.are_stale():
             self._model()
         elif self._masses.dynamics.read():
-            self._others = OtherForces(self._masses.dynamics.gravity)
+            self._others = self._masses.dynamics.other_forces()
         if self._inside and self._rules is not self.bodies.rules:
             # A script may have let pairs collide since, or made new ones.
             self._rules = self.bodies.rules
@@ -321,7 +324,7 @@ class VolumetricContact:
     def _model(self) -> None:
         """Read the masses and joints of the bodies."""
         self._masses = Masses(self.bodies, self._mechanics, self._layers)
-        self._others = OtherForces(self._masses.dynamics.gravity)
+        self._others = self._masses.dynamics.other_forces()
 
     @property
     def _planned(self) -> int:

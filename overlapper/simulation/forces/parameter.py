@@ -19,7 +19,7 @@ OfPair = Callable[[LinkKey, LinkKey], float]
 class Layers:
     """The elastic layers of the bodies: stiffness, dissipation and friction, as `VolumetricContact` takes them.
 
-    With `distributed` friction, the coefficients are those of the links.
+    With `distributed` friction, the coefficients are those of the simulator.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class Layers:
         `pairs` (p, 2) are pairs of indices in `dynamics.links`.
         """
         links = dynamics.links
-        friction = self._friction.of(pairs, links) if self._friction else dynamics.friction[pairs].prod(axis=1)
+        friction = self._friction.of(pairs, links) if self._friction else dynamics.friction(pairs)
         return self._stiffness.of(pairs, links), self._dissipation.of(pairs, links), friction
 
 

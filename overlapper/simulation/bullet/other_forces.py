@@ -1,4 +1,4 @@
-"""The forces on bodies that do not come from contacts, found from the change of velocities."""
+"""The forces on bodies that do not come from contacts. pybullet does not tell them: velocities do."""
 
 from __future__ import annotations
 
@@ -7,11 +7,8 @@ import numpy as np
 from overlapper.simulation.model import Array
 
 
-class OtherForces:
-    """The last acceleration of all coordinates by everything except contacts.
-
-    This includes gravity, motors, constraints and whatever else acts.
-    """
+class LearntForces:
+    """See `OtherForces`: the last acceleration of all coordinates, found from the change of their velocities."""
 
     def __init__(self, gravity: Array) -> None:
         """Begin with `gravity`, the acceleration that is known before anything has moved."""
