@@ -13,8 +13,19 @@ Shapes and pair rules are read once, poses at every step. pybullet is not needed
 """
 
 from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.forces.contact import VolumetricContact
+from overlapper.simulation.forces.forces import Forces
 from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
 from overlapper.simulation.mujoco.bodies import Bodies
 from overlapper.simulation.mujoco.contact import GeomContact
 
-__all__ = ["Bodies", "Contacts", "GeomContact", "LinkContact", "LinkContacts", "link_contacts"]
+__all__ = [
+    "Bodies",
+    "Contacts",
+    "Forces",
+    "GeomContact",
+    "LinkContact",
+    "LinkContacts",
+    "VolumetricContact",
+    "link_contacts",
+]

@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
-from weakref import WeakSet
 
 import mujoco
 
-from overlapper.simulation.engine import Happening, Listener
 from overlapper.simulation.mujoco.bodies import Bodies
+from overlapper.simulation.mujoco.calls import listen, steps_of_call
 
-__stands_in__ = "mujoco"  # so that tracebacks of scripts end before the frames of this module
-
-STEPS = ("mj_step", "mj_step2")
-"""The functions that end a step."""
-
-_originals: dict[str, Callable[..., Any]] = {}
-_listeners: list[Listener] = []
-_begun: WeakSet[mujoco.MjData] = WeakSet()
-_steps_of_call = 1  # steps made by the call that is being reported to listeners
+__all__ = ["Simulated", "begin", "build_of", "listen", "running"]
 
 
 class Simulated:
@@ -38,7 +28,7 @@ class Simulated:
 
     @property
     def time_step(self) -> float:
-        return float(self._known.model.opt.timestep) * _steps_of_call
+        return float(self._known.model.opt.timestep) * steps_of_call()
 
     def build(self, build: Callable[..., Any], parameters: Mapping[str, Any]) -> Any:
         model, data, *step = _parts(build(**parameters))
@@ -86,49 +76,3 @@ def build_of(path: Path) -> tuple[Callable[[], Any], float]:
     """A `build` that compiles an MJCF file, and the model's time step. ValueError if the file does not compile."""
     model = mujoco.MjModel.from_xml_path(str(path))
     return lambda: mujoco.MjModel.from_xml_path(str(path)), float(model.opt.timestep)
-
-
-def listen(listener: Listener) -> Callable[[], None]:
-    """Notice calls of `mujoco.mj_step` and `mujoco.mj_step2`, but not of names imported from mujoco earlier.
-
-    Listeners get the MjData of the simulation. A simulation begins with its first step that is noticed.
-    """
-    if not _listeners:
-        for name in STEPS:
-            _originals[name] = getattr(mujoco, name)
-            setattr(mujoco, name, _heard(_originals[name]))
-    _listeners.append(listener)
-
-    def unlisten() -> None:
-        if listener in _listeners:
-            _listeners.remove(listener)
-            if not _listeners:
-                _begun.clear()
-                for name, original in _originals.items():
-                    setattr(mujoco, name, original)
-
-    return unlisten
-
-
-def _heard(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function, with each call reported to listeners."""
-
-    @functools.wraps(function)
-    def step(m: mujoco.MjModel, d: mujoco.MjData, *args: Any, **kwargs: Any) -> None:
-        global _steps_of_call
-        function(m, d, *args, **kwargs)
-        _steps_of_call = int(args[0] if args else kwargs.get("nstep", 1))
-        try:
-            if d not in _begun:
-                _begun.add(d)
-                _tell("began", d)
-            _tell("stepped", d)
-        finally:
-            _steps_of_call = 1
-
-    return step
-
-
-def _tell(happening: Happening, data: mujoco.MjData) -> None:
-    for listener in tuple(_listeners):
-        listener(happening, data)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.simulation.collision_rules import Indices, Mask
+from overlapper.simulation.mujoco.silence import asked_flags
 
 PLANE, HFIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -24,7 +25,7 @@ def in_force(model: Any) -> bytes:
         model.pair_geom1,
         model.pair_geom2,
         model.exclude_signature,
-        np.array([model.opt.disableflags]),
+        np.array([asked_flags(model)]),
     )
     return b"".join(each.tobytes() for each in arrays)
 
@@ -45,8 +46,9 @@ class PairRule:
         self._fixed = model.body_dofnum[weld] == 0
         self._group, self._mask = model.geom_contype[geoms].copy(), model.geom_conaffinity[geoms].copy()
         self._surface = np.isin(model.geom_type[geoms], (PLANE, HFIELD))
-        self._by_parent = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
-        self._none = bool(model.opt.disableflags & NO_CONTACTS)
+        flags = asked_flags(model)
+        self._by_parent = not flags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+        self._none = bool(flags & NO_CONTACTS)
         self._excluded = np.unique(model.exclude_signature.astype(np.int64))
         place = np.full(model.ngeom, -1)
         place[geoms] = np.arange(len(geoms))

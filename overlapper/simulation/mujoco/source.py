@@ -13,6 +13,7 @@ from overlapper.simulation.model import LinkKey, ModelledBody, Skipped
 from overlapper.simulation.mujoco.contact import GeomContact
 from overlapper.simulation.mujoco.geoms import collidable, drawn_from, modelled_bodies
 from overlapper.simulation.mujoco.pair_rule import PairRule, in_force
+from overlapper.simulation.mujoco.stepping import MujocoStepping
 from overlapper.simulation.source import Source
 
 
@@ -79,6 +80,12 @@ class MujocoSource(Source):
     @property
     def unidentified(self) -> int:
         return int(self._model.nflex)
+
+    def mechanics(self) -> MujocoStepping:
+        lost = next((each for body in self.bodies.values() for each in body.skipped), None)
+        if lost := lost or next(iter(self.skipped), None):
+            raise ValueError(f"VolumetricContact cannot replace MuJoCo's contacts of {lost.name}: {lost.reason}")
+        return MujocoStepping(self._model, self._data)
 
     def cautions(self, layout: Layout) -> Iterator[Warning]:
         """One warning if a contact filter decides which pairs collide, as Python cannot ask the filter."""

@@ -1,0 +1,130 @@
+"""The bodies of a MuJoCo model as masses and joints, and their velocities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import _core
+from overlapper.simulation.layout import Pose
+from overlapper.simulation.model import Array
+from overlapper.simulation.mujoco.friction import friction
+from overlapper.simulation.mujoco.geoms import UNTURNED, collidable
+
+if TYPE_CHECKING:
+    from overlapper.simulation.mujoco.stepping import MujocoStepping
+
+NOT_IMPLICIT = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
+
+
+class MujocoDynamics:
+    """See `Dynamics`: `links` are geoms (body, geom). Coordinates are MuJoCo's degrees of freedom, in its order.
+
+    MuJoCo's own mass matrix and motion axes are used. So armature, ball joints and several joints of a body count.
+    """
+
+    def __init__(self, stepping: MujocoStepping, bodies: Sequence[int]) -> None:
+        self._stepping, self._model, self._data = stepping, stepping.model, stepping.data
+        model, known = self._model, set(bodies)
+        owner = model.geom_bodyid
+        self.links = [(int(owner[g]), g) for g in collidable(model).tolist() if int(owner[g]) in known]
+        self.place = {each: k for k, each in enumerate(self.links)}
+        self._bodies = np.array([body for body, _ in self.links], dtype=np.int64)
+        self._geoms = np.array([geom for _, geom in self.links], dtype=np.int64)
+        self._trees = [slice(a, a + n) for a, n in zip(model.tree_dofadr.tolist(), model.tree_dofnum.tolist())]
+        moved = [(k, dof) for k, (body, _) in enumerate(self.links) for dof in _moving(model, body)]
+        self.solver = _core.ContactSolver.of_trees(
+            model.tree_dofnum, model.body_treeid[self._bodies], np.array(moved, dtype=np.int64).reshape(-1, 2)
+        )
+        width = max((tree.stop - tree.start for tree in self._trees), default=0)
+        self._units = np.zeros((width, model.nv))  # row k has 1 at the k-th coordinate of each tree
+        for tree in self._trees:
+            self._units[range(tree.stop - tree.start), range(tree.start, tree.stop)] = 1
+        self._roots = model.body_rootid[model.dof_bodyid]
+        self.acceleration: Array = np.zeros(model.nv)  # without contacts, at the last `frames`
+
+    def read(self) -> bool:
+        return False  # `frames` reads all masses anyway
+
+    def friction(self, pairs: NDArray[np.int64]) -> Array:
+        first, second = self._geoms[pairs].T
+        return friction(self._model, first, second)
+
+    def other_forces(self) -> KnownForces:
+        return KnownForces(self)
+
+    def frames(self) -> list[Pose]:
+        """The centres of mass of the links' bodies. Their orientations are not needed."""
+        data = self._data
+        inverse_mass = self._inverse_mass()
+        axes = data.cdof  # angular and linear, about the centre of mass of the tree
+        self.solver.move(axes[:, 3:], axes[:, :3], data.subtree_com[self._roots], inverse_mass)
+        return [(each, UNTURNED) for each in data.xipos[self._bodies].tolist()]
+
+    def _inverse_mass(self) -> Array:
+        """(c, w) as the solver takes it. It also finds the acceleration without contacts.
+
+        Euler's integrator treats the damping D of joints as implicit: it replaces M by M + h D in a step of h. So does
+        this inverse. The length h is that of the last substep.
+        """
+        data, damping = self._data, self._stepping.length * self._damping()
+        inverse = np.empty_like(self._units)
+        mujoco.mj_solveM(self._model, data, inverse, self._units)
+        inverse = np.ascontiguousarray(inverse.T)
+        self.acceleration = data.qacc.copy()
+        for tree in self._trees:
+            if damping[tree].any():
+                own = inverse[tree, : tree.stop - tree.start]
+                own[:] = np.linalg.solve(np.eye(len(own)) + own * damping[tree], own)
+                self.acceleration[tree] -= own @ (damping[tree] * self.acceleration[tree])
+        return inverse
+
+    def _damping(self) -> Array:
+        """(c,) the derivatives of damping forces by the velocities, if the integrator treats them as implicit."""
+        model = self._model
+        if int(model.opt.disableflags) & NOT_IMPLICIT:
+            return np.zeros(model.nv)
+        damping, speed = model.dof_damping.copy(), np.abs(self._data.qvel)
+        for k, coefficient in enumerate(model.dof_dampingpoly.T):
+            damping += (k + 2) * coefficient * speed ** (k + 1)
+        return np.asarray(damping)
+
+    def velocity(self) -> Array:
+        return np.array(self._data.qvel)
+
+    def apply(self, wrenches: NDArray[np.float64], frames: Sequence[Pose]) -> None:
+        """Let forces and torques (n, 6) about the centres of mass act in the next step."""
+        np.add.at(self._stepping.wrenches, self._bodies, wrenches)
+
+
+class KnownForces:
+    """See `OtherForces`: MuJoCo has computed the acceleration without contacts."""
+
+    def __init__(self, dynamics: MujocoDynamics) -> None:
+        self._dynamics = dynamics
+
+    def ahead(self, velocity: Array, duration: float) -> Array:
+        return np.asarray(velocity + duration * self._dynamics.acceleration)
+
+    def learnt(self, velocity: Array) -> Array:
+        return self._dynamics.acceleration
+
+    def solved(self, velocity: Array, duration: float, ours: Array) -> None:
+        return
+
+    def left_at(self, velocity: Array) -> None:
+        return
+
+
+def _moving(model: Any, body: int) -> Iterator[int]:
+    """The coordinates that move a body, among those of its tree. See mj_jac."""
+    while body and not model.body_dofnum[body]:
+        body = int(model.body_parentid[body])
+    dof = int(model.body_dofadr[body] + model.body_dofnum[body]) - 1 if body else -1
+    while dof >= 0:
+        yield dof - int(model.tree_dofadr[model.dof_treeid[dof]])
+        dof = int(model.dof_parentid[dof])
