@@ -107,7 +107,7 @@ def test_a_function_gives_the_stiffness_of_each_pair(world):
 
 def test_a_step_outside_of_the_with_block_is_refused(world):
     contact = world.contact()
-    said = r"^step\(\) must be called within `with contact:`, where Bullet does not push these pairs apart$"
+    said = r"^step\(\) must be called within `with contact:`, where the simulator does not push these pairs apart$"
     with pytest.raises(RuntimeError, match=said):
         contact.step()
     with contact:

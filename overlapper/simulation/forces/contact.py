@@ -25,13 +25,13 @@ MOST_SUBSTEPS = 200
 
 
 class VolumetricContact:
-    """Contact forces from the volumes that pybullet bodies share, in place of Bullet's contact points.
+    """Contact forces from the volumes that bodies share, in place of the contact points of pybullet or MuJoCo.
 
-        bodies = Bodies(physicsClientId)
+        bodies = Bodies(physicsClientId)  # or Bodies(model, data)
         contact = VolumetricContact(bodies)
         with contact:
             while ...:
-                contact.step()  # instead of pybullet.stepSimulation()
+                contact.step()  # instead of pybullet.stepSimulation() or mujoco.mj_step(model, data)
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ class VolumetricContact:
         Time in s by which pressures are ahead of the depth (Kelvin and Voigt). The damping ratio of an oscillation of
         angular frequency w is w * dissipation / 2. A dissipation of 0 keeps the energy.
     friction : float, callable or 'distributed', optional
-        Coulomb's coefficient. Default: that of pybullet, the product of the two links' lateralFriction. With
-        "distributed", friction acts at points spread over the patch, with pybullet's coefficients. This is more exact
-        where bodies slip and spin at once.
+        Coulomb's coefficient. Default: that of the simulator. In pybullet it is the product of the two links'
+        lateralFriction, in MuJoCo the sliding friction of the two geoms. With "distributed", friction acts at points
+        spread over the patch, with the simulator's coefficients. This is more exact where bodies slip and spin at once.
     substeps : int or 'auto', default 'auto'
         Number of parts of a step of the simulator. 'auto': it follows from the stiffness and the masses, anew in every
         step.
@@ -58,9 +58,10 @@ class VolumetricContact:
     TypeError
         If `bodies` is not the Bodies of a simulation.
     ValueError
-        If another argument is invalid. The message names it.
+        If another argument is invalid. The message names it. In MuJoCo also if the model has a geom that is not
+        modelled, another integrator than Euler, or sleeping bodies.
     RuntimeError
-        At the `with`, if its client has an active VolumetricContact already.
+        At the `with`, if the simulation has an active VolumetricContact already.
 
     Notes
     -----
@@ -71,23 +72,28 @@ class VolumetricContact:
     force counts twice.
 
     `stiffness`, `dissipation` and `friction` may be functions of the pair of links, as in stiffness=lambda a, b: ....
-    The arguments are two (body, link). The function is called once for each pair.
+    The arguments are two (body, link), in MuJoCo two (body, geom). The function is called once for each pair.
 
     A patch resists slip and spin together: its force and torque stay within an ellipsoid. Sticking bodies do not creep.
-    Restitution, rolling and spinning friction of pybullet are not used.
+    Restitution, rolling and spinning friction of the simulator are not used.
 
     If there are too few substeps, each pair gives one SubstepsWarning. The contacts of such pairs are then solved by
     backward Euler, which loses energy.
 
-    Within the `with`, Bullet does not respond to these pairs, whether they touch or not, and getContactPoints has none
-    of them. Bullet simulates everything else: joints, motors, constraints and other pairs. A `Bodies` with a recorder
-    knows which pairs a script has filtered. Without a recorder, filtered pairs are pushed apart, too.
+    Within the `with`, the simulator does not respond to these pairs, whether they touch or not. It has no contact
+    points of them. It simulates everything else: joints, motors, constraints and, in pybullet, other pairs.
 
-    All other forces on the bodies (gravity, motors, constraints, forces of the script) are assumed to be as in the
-    substep before. Within the `with`, the script's commands to motors and constraints and the forces that it applies
-    are given again in each substep. So they last for the whole step, though pybullet keeps them as impulses. Gains of
-    motors are those of a whole step, too. A motor that was commanded before the `with` is stronger by the number of
-    substeps, unless a recorder knows the command.
+    In pybullet, a `Bodies` with a recorder knows which pairs a script has filtered. Without a recorder, filtered pairs
+    are pushed apart, too. All other forces on the bodies (gravity, motors, constraints, forces of the script) are
+    assumed to be as in the substep before. Within the `with`, the script's commands to motors and constraints and the
+    forces that it applies are given again in each substep. So they last for the whole step, though pybullet keeps them
+    as impulses. Gains of motors are those of a whole step, too. A motor that was commanded before the `with` is
+    stronger by the number of substeps, unless a recorder knows the command.
+
+    In MuJoCo, all other forces are known, because MuJoCo computes them first. Its contacts can only be turned off for
+    all pairs at once, so `pairs` must contain all pairs that it lets collide. The flag belongs to the model: other data
+    of the same model have no contacts within the `with`, either. `data.xfrc_applied` keeps the forces of the script.
+    After `step()`, `data` has the poses from before the last integration, as after mj_step.
 
     A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning. The other bodies continue.
 
@@ -148,11 +154,11 @@ class VolumetricContact:
         Raises
         ------
         RuntimeError
-            Outside of the `with`, because Bullet would push the bodies apart as well.
+            Outside of the `with`, because the simulator would push the bodies apart as well.
         """
         if not self._inside:
             raise RuntimeError(
-                "step() must be called within `with contact:`, where Bullet does not push these pairs apart"
+                "step() must be called within `with contact:`, where the simulator does not push these pairs apart"
             )
         duration = self.bodies.time_step
         self._mechanics.prepare()

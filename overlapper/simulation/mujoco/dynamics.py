@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import _core
-from overlapper.simulation.layout import Pose
+from overlapper.simulation.layout import FARTHEST, Pose
 from overlapper.simulation.model import Array
 from overlapper.simulation.mujoco.friction import friction
-from overlapper.simulation.mujoco.geoms import UNTURNED, collidable
+from overlapper.simulation.mujoco.geoms import collidable
 
 if TYPE_CHECKING:
     from overlapper.simulation.mujoco.stepping import MujocoStepping
 
+NO_TURN = (0.0, 0.0, 0.0, 1.0)
 NOT_IMPLICIT = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
 
 
@@ -63,7 +64,7 @@ class MujocoDynamics:
         inverse_mass = self._inverse_mass()
         axes = data.cdof  # angular and linear, about the centre of mass of the tree
         self.solver.move(axes[:, 3:], axes[:, :3], data.subtree_com[self._roots], inverse_mass)
-        return [(each, UNTURNED) for each in data.xipos[self._bodies].tolist()]
+        return [(each, NO_TURN) for each in data.xipos[self._bodies].tolist()]
 
     def _inverse_mass(self) -> Array:
         """(c, w) as the solver takes it. It also finds the acceleration without contacts.
@@ -75,7 +76,8 @@ class MujocoDynamics:
         inverse = np.empty_like(self._units)
         mujoco.mj_solveM(self._model, data, inverse, self._units)
         inverse = np.ascontiguousarray(inverse.T)
-        self.acceleration = data.qacc.copy()
+        known = np.abs(data.qacc) < FARTHEST  # MuJoCo resets data with larger accelerations
+        self.acceleration = np.where(known, data.qacc, 0.0)
         for tree in self._trees:
             if damping[tree].any():
                 own = inverse[tree, : tree.stop - tree.start]

@@ -56,8 +56,8 @@ class MujocoStepping:
         asked = np.array([(place[a], place[b]) for (_, a), (_, b) in pairs], dtype=np.intp).reshape(-1, 2)
         if missing := rule.count(np.ones(len(geoms), dtype=np.int64)) - int(rule.allow(*asked.T).sum()):
             raise ValueError(
-                f"pairs must contain all pairs that MuJoCo lets collide, but it leaves out {missing}: MuJoCo's contacts "
-                "can only be turned off for all pairs at once"
+                f"pairs must contain all pairs that MuJoCo lets collide, but it leaves out {missing}: "
+                "MuJoCo's contacts can only be turned off for all pairs at once"
             )
 
     def leave(self) -> None:

@@ -101,7 +101,7 @@ def test_a_tree_with_given_masses_moves_as_the_body_with_these_masses():
 
 
 def test_links_of_one_tree_push_each_other_through_their_common_masses():
-    """A mass of 1 kg on a slide, on a mass of 3 kg on a slide: the first coordinate moves both, the second one alone."""
+    """A mass of 1 kg slides on one of 3 kg, which slides, too. The first coordinate moves both masses."""
     tree = _core.ContactSolver.of_trees([2], [0, 0], [(0, 0), (1, 0), (1, 1)])
     up, still = np.tile([0, 0, 1], (2, 1)), np.zeros((2, 3))
     inverse = np.linalg.inv([[4, 1], [1, 1]])
