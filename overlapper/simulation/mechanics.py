@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -73,8 +73,11 @@ class Mechanics(Protocol):
     def dynamics(self, bodies: Sequence[int]) -> Dynamics:
         """The masses and joints of these bodies."""
 
-    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
-        """Turn the simulator's own response to these pairs off. RuntimeError if the simulation is within another."""
+    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None]) -> None:
+        """Turn the simulator's own response to these pairs off. RuntimeError if the simulation is within another.
+
+        A simulator that can ask for forces within its own steps calls `answer`, which calls `Dynamics.apply`.
+        """
 
     def turn_off(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
         """Turn the response off for these pairs, too."""

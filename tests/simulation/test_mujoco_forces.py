@@ -1,5 +1,6 @@
 """Volumetric contact on MuJoCo: textbooks, MuJoCo's own masses, and what it leaves as a script has set it."""
 
+import ctypes
 import math
 import re
 from contextlib import closing, contextmanager
@@ -203,7 +204,7 @@ def test_the_solver_foretells_the_velocities_of_mujoco(damping, substeps):
     links = np.array([dynamics.place[body, geom] for body, geom, _ in bodies.keys])
     pressed, length = 0, STEP / substeps
     stepping.length = length
-    stepping.enter(bodies.link_pairs())
+    stepping.enter(bodies.link_pairs(), list)
     for _ in range(400 * substeps):
         stepping.prepare()
         bodies.follow()
@@ -399,6 +400,123 @@ def test_laws_are_functions_of_bodies_and_geoms():
         contact.step()
         contact.step()
     assert asked == [((0, 0), (1, 1))]
+
+
+# ------------------------------------------------------------------------------------------ loops that are unchanged
+
+
+def test_mj_step_within_the_block_has_the_forces_of_a_step_in_one_substep():
+    model, data = simulated(MECHANISM.format(0.3, 0, 0, 0.5, 2, 0.1))
+    other = mujoco.MjData(model)
+    mujoco.mj_forward(model, other)
+    with pressing(model, data, substeps=1) as one, pressing(model, other) as two:
+        for _ in range(200):
+            one.step()
+            mujoco.mj_step(model, other)
+            assert np.array_equal(one.force, two.force)
+        mujoco.mj_step(model, other, 50)
+        advance(one, 0.05)
+        assert two.substeps == 1 and len(two) > 1 and two.mean().force == pytest.approx(one.mean().force)
+    assert np.array_equal(data.qpos, other.qpos) and np.array_equal(data.qvel, other.qvel)
+    assert data.time == other.time and not other.xfrc_applied.any() and mujoco.get_mjcb_control() is None
+
+
+def test_only_its_own_data_is_pushed():
+    model, data = resting_cube()
+    other_model, other = resting_cube()
+    with pressing(model, data):
+        for _ in range(200):
+            mujoco.mj_step(model, data)
+            mujoco.mj_step(other_model, other)
+    assert other.ncon and not data.ncon and data.qpos[2] == pytest.approx(HALF - G / 1e5, abs=1e-7)
+    assert abs(other.qpos[2] - data.qpos[2]) > 1e-5  # MuJoCo's own contacts are softer
+
+
+def test_a_control_callback_of_the_script_is_called_first_and_comes_back():
+    slider = '<body pos="0 0 1"><joint name="j" type="slide" axis="1 0 0"/><geom size=".05" mass="2"/></body>'
+    model, data = simulated(slider + free(CUBE, f"0 0 {HALF}"), rest='<actuator><motor joint="j"/></actuator>')
+
+    def push(model, data):
+        data.ctrl[0] = 6
+
+    mujoco.set_mjcb_control(push)
+    try:
+        with pressing(model, data) as contact:
+            for _ in range(10):
+                mujoco.mj_step(model, data)
+            assert contact.on(2)[0][2] > 0 and data.qvel[0] == pytest.approx(0.03)
+            advance(contact, 0.01)
+        assert mujoco.get_mjcb_control() is push and data.qvel[0] == pytest.approx(0.06)
+        with pressing(model, data):
+            mujoco.set_mjcb_control(None)  # what the script sets within the block stays, too
+        assert mujoco.get_mjcb_control() is None
+    finally:
+        mujoco.set_mjcb_control(None)
+
+
+def test_contacts_may_end_in_any_order():
+    models = [resting_cube() for _ in range(2)]
+    first, second = (VolumetricContact(Bodies(*each)) for each in models)
+    first.__enter__()
+    second.__enter__()
+    first.__exit__()
+    for model, data in models:
+        mujoco.mj_step(model, data)
+    assert (len(first), len(second)) == (0, 1) and models[0][1].ncon
+    second.__exit__()
+    assert mujoco.get_mjcb_control() is None
+
+
+def test_forces_of_the_script_replace_ours_until_the_next_step():
+    """Rows of xfrc_applied that the script writes are the script's. All others are as it has left them."""
+    model, data = simulated(free(CUBE, f"0 0 {HALF - G / 1e5}") + free(CUBE, f"1 0 {HALF - G / 1e5}"))
+    data.xfrc_applied[1] = data.xfrc_applied[2] = 0, 0, -1, 0, 0, 0
+    with pressing(model, data):
+        mujoco.mj_step(model, data)
+        assert data.xfrc_applied[:, 2] == pytest.approx([0, G - 1, G - 1], abs=0.2)  # with those of contacts
+        data.xfrc_applied[2] = 0, 0, -3, 0, 0, 0
+        for _ in range(2000):
+            mujoco.mj_step(model, data)
+    assert data.xfrc_applied[:, 2].tolist() == [0, -1, -3]
+    assert HALF - data.qpos[2] == pytest.approx((G + 1) / 1e5) and HALF - data.qpos[9] == pytest.approx((G + 3) / 1e5)
+
+
+def test_one_substep_of_mj_step_that_is_too_few_is_reported_at_its_line():
+    model, data = resting_cube(step=0.01)
+    with pressing(model, data, stiffness=1e8):
+        with pytest.warns(
+            overlapper.simulation.SubstepsWarning, match="^1 substeps are too few .* fewer than 1. "
+        ) as told:
+            mujoco.mj_step(model, data)
+        assert told[0].filename == __file__
+
+
+def test_what_fails_in_a_step_of_mujoco_is_told_and_undone():
+    model, data = resting_cube()
+
+    def fails(a, b):
+        raise KeyError
+
+    with pressing(model, data, stiffness=fails):
+        with pytest.raises(KeyError):
+            mujoco.mj_step(model, data)
+        model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_RK4)
+        with pytest.raises(ValueError, match=r"^VolumetricContact needs MuJoCo's Euler integrator, not RK4"):
+            mujoco.mj_step(model, data)
+    assert not data.xfrc_applied.any() and model.opt.disableflags == 0
+
+
+def test_a_control_callback_of_c_is_refused():
+    model, data = resting_cube()
+    mujoco.set_mjcb_control(ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(lambda model, data: None))
+    try:
+        with pytest.raises(
+            ValueError, match=r"^mujoco\.set_mjcb_control has set a function of C: VolumetricContact can"
+        ):
+            VolumetricContact(Bodies(model, data)).__enter__()
+    finally:
+        mujoco.set_mjcb_control(None)
+    assert model.opt.disableflags == 0
 
 
 # ----------------------------------------------------------------------------------------------------------- refusals

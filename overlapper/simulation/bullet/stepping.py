@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from weakref import WeakValueDictionary
 
 import pybullet
@@ -41,7 +41,7 @@ class Stepping:
     def dynamics(self, bodies: Sequence[int]) -> BulletDynamics:
         return BulletDynamics(self._client, bodies)
 
-    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
+    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None]) -> None:
         if self._client in _INSIDE:
             raise RuntimeError(
                 f"physicsClientId {self._client} already has an active VolumetricContact: leave its `with` block first"

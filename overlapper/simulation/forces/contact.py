@@ -140,7 +140,7 @@ class VolumetricContact:
 
     def __enter__(self) -> VolumetricContact:
         self._rules = self.bodies.rules
-        self._mechanics.enter(self.bodies.link_pairs(self._among))
+        self._mechanics.enter(self.bodies.link_pairs(self._among), self._answer)
         self._inside = True
         return self
 
@@ -308,6 +308,19 @@ class VolumetricContact:
     def __repr__(self) -> str:
         return f"VolumetricContact({len(self)} pairs of shapes press, {self.substeps} substeps)"
 
+    def _answer(self) -> None:
+        """Apply the forces of a step that the simulator makes by itself, in one piece."""
+        self._told.further = 2  # the simulator's callback is between
+        try:
+            self._refresh()
+            velocity, lost = self._velocity()
+            frequency2 = self._place(lost)
+            wrenches = self._solve(self.bodies.time_step, velocity, frequency2, whole=True)
+        finally:
+            self._told.further = 0
+        self._masses.dynamics.apply(wrenches, self._frames)
+        self._parts, self.substeps = [(1.0, self._found)], 1
+
     def _refresh(self) -> None:
         """Read which bodies have come or gone, and the masses."""
         self.bodies.update()
@@ -362,12 +375,12 @@ class VolumetricContact:
         ahead = self._others.ahead(velocity, duration)
         return coming(self._masses, self._frames, self._contacts.overlaps, duration, ahead, self._among)
 
-    def _solve(self, duration: float, velocity: Array, frequency2: Array) -> Array:
-        """Return the forces of a step of this duration: (n, 6) force and torque on the links."""
+    def _solve(self, duration: float, velocity: Array, frequency2: Array, whole: bool = False) -> Array:
+        """Return (n, 6) force and torque on the links, in a substep of this duration or in a `whole` step."""
         other = self._others.learnt(velocity)
         damped = frequency2 * duration**2 > COARSE**2
         if damped.any():
-            planned = self._planned or MOST_SUBSTEPS
+            planned = 1 if whole else self._planned or MOST_SUBSTEPS
             self._told.of_substeps(self._contacts, damped, frequency2, duration, planned)
         wrenches: Array
         force, torque, slip, normal, directed, wrenches, ours, self.sweeps = self._masses.dynamics.solver.solve(

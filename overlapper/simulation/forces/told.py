@@ -18,8 +18,10 @@ from overlapper.simulation.model import Array, LinkKey
 class Told:
     """The pairs of links and the bodies that users were already warned of.
 
-    Warnings name the line that calls the caller's caller.
+    Warnings name the line that calls the caller's caller, or a line that is `further` calls away.
     """
+
+    further = 0
 
     def __init__(self, bodies: AnyBodies) -> None:
         self._bodies = bodies
@@ -37,7 +39,7 @@ class Told:
                 f"{substeps} substeps are too few for the stiffness between {a} and {b}, which oscillate at up to "
                 f"{frequency:.0f} rad/s: with fewer than {needed} substeps, their contact loses energy",
                 SubstepsWarning,
-                stacklevel=4,
+                stacklevel=4 + self.further,
             )
 
     def of_direction(self, contacts: Contacts, lost: NDArray[np.bool_]) -> None:
@@ -47,7 +49,7 @@ class Told:
                 f"{a} and {b} overlap without a direction of force, because one lies within the other "
                 "or goes through it; the force keeps its last direction",
                 NoDirectionWarning,
-                stacklevel=4,
+                stacklevel=4 + self.further,
             )
 
     def of_velocity(self, lost: Iterable[int]) -> None:
@@ -59,7 +61,7 @@ class Told:
                 f"{name} (body {body}, link {link}) has no contacts, because its velocity is not finite: "
                 "the simulation has diverged",
                 SkippedShapeWarning,
-                stacklevel=4,
+                stacklevel=4 + self.further,
             )
 
     def _new(self, kind: type[Warning], contacts: Contacts, rows: NDArray[np.bool_]) -> Iterator[tuple[int, str, str]]:

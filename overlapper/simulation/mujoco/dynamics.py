@@ -38,8 +38,10 @@ class MujocoDynamics:
         self._geoms = np.array([geom for _, geom in self.links], dtype=np.int64)
         self._trees = [slice(a, a + n) for a, n in zip(model.tree_dofadr.tolist(), model.tree_dofnum.tolist())]
         moved = [(k, dof) for k, (body, _) in enumerate(self.links) for dof in _moving(model, body)]
+        trees = model.body_treeid[self._bodies]
+        self._move = trees >= 0  # the others stand still
         self.solver = _core.ContactSolver.of_trees(
-            model.tree_dofnum, model.body_treeid[self._bodies], np.array(moved, dtype=np.int64).reshape(-1, 2)
+            model.tree_dofnum, trees, np.array(moved, dtype=np.int64).reshape(-1, 2)
         )
         width = max((tree.stop - tree.start for tree in self._trees), default=0)
         self._units = np.zeros((width, model.nv))  # row k has 1 at the k-th coordinate of each tree
@@ -100,7 +102,7 @@ class MujocoDynamics:
 
     def apply(self, wrenches: NDArray[np.float64], frames: Sequence[Pose]) -> None:
         """Let forces and torques (n, 6) about the centres of mass act in the next step."""
-        np.add.at(self._stepping.wrenches, self._bodies, wrenches)
+        np.add.at(self._stepping.wrenches, self._bodies[self._move], wrenches[self._move])
 
 
 class KnownForces:

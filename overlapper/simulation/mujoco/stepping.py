@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from _ctypes import CFuncPtr
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
-from weakref import WeakSet
+from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
 
-from overlapper.simulation.model import LinkKey
+from overlapper.simulation.model import Array, LinkKey
 from overlapper.simulation.mujoco.calls import stepped, unheard
 from overlapper.simulation.mujoco.dynamics import MujocoDynamics
 from overlapper.simulation.mujoco.geoms import collidable
@@ -18,8 +19,19 @@ from overlapper.simulation.mujoco.silence import end_silence, silence, silenced
 
 EULER, SLEEP = mujoco.mjtIntegrator.mjINT_EULER, int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
-_inside: WeakSet[mujoco.MjData] = WeakSet()
-"""The simulations that a `MujocoStepping` has entered."""
+_inside: WeakKeyDictionary[Any, MujocoStepping] = WeakKeyDictionary()
+"""By MjData: the `MujocoStepping` that has entered it."""
+
+_before: Callable[[Any, Any], None] | None = None
+"""The control callback of the script, which `_control` replaces and calls."""
+
+
+def _control(model: Any, data: Any) -> None:
+    """MuJoCo's control callback while any simulation is entered. MuJoCo calls it in each step of any simulation."""
+    if _before is not None:
+        _before(model, data)
+    if stepping := _inside.get(data):
+        stepping.respond()
 
 
 class MujocoStepping:
@@ -35,17 +47,30 @@ class MujocoStepping:
         self.model, self.data = model, data
         self.length = float(model.opt.timestep)
         self.wrenches = np.zeros((model.nbody, 6))
+        self._answer: Callable[[], None] = _nothing
+        self._by_hand = False  # within a step that `prepare` and `step` make
+        self._given: tuple[Array, Array] | None = None  # the script's xfrc_applied, and the same with our forces
         self._must_be_supported()
 
     def dynamics(self, bodies: Sequence[int]) -> MujocoDynamics:
         return MujocoDynamics(self, bodies)
 
-    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
+    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None]) -> None:
+        global _before
         if self.data in _inside:
             raise RuntimeError("data already has an active VolumetricContact: leave its `with` block first")
         self._must_be_supported()
         self.turn_off(pairs)
-        _inside.add(self.data)
+        if not _inside:
+            before = mujoco.get_mjcb_control()
+            if isinstance(before, CFuncPtr):
+                raise ValueError(
+                    "mujoco.set_mjcb_control has set a function of C: VolumetricContact can only call a Python function"
+                )
+            _before = before
+            mujoco.set_mjcb_control(_control)
+        _inside[self.data] = self
+        self._answer = answer
         silence(self.model)
 
     def turn_off(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
@@ -61,46 +86,82 @@ class MujocoStepping:
             )
 
     def leave(self) -> None:
-        _inside.discard(self.data)
+        global _before
+        del _inside[self.data]
+        self._answer = _nothing
+        self._take()
         end_silence(self.model)
+        if not _inside:
+            if mujoco.get_mjcb_control() is _control:
+                mujoco.set_mjcb_control(_before)
+            _before = None
 
     def pose(self) -> None:
         mujoco.mj_kinematics(self.model, self.data)
 
     def prepare(self) -> None:
         """Do the first half of a step, up to the acceleration by everything except contacts."""
-        self._must_be_supported()
-        model, data = self.model, self.data
-        with silenced(model):
-            unheard("mj_step1")(model, data)
-            mujoco.mj_fwdActuation(model, data)
-            mujoco.mj_fwdAcceleration(model, data)
-            mujoco.mj_fwdConstraint(model, data)
-        self.wrenches[:] = 0
+        self._take()
+        self._by_hand = True
+        try:
+            with silenced(self.model):
+                unheard("mj_step1")(self.model, self.data)
+                self._accelerate()
+        finally:
+            self._by_hand = False
+
+    def respond(self) -> None:
+        """Add the forces of a step that MuJoCo makes. MuJoCo has just computed the forces that depend on velocities."""
+        if self._by_hand:
+            return
+        self._take()
+        self.length = float(self.model.opt.timestep)
+        self._accelerate()
+        self._answer()
+        self._give()
 
     def begin(self, length: float, duration: float, first: bool) -> None:
         self.length = length
 
     def step(self) -> None:
         """Do the second half of a step, with the wrenches in addition to the forces that a script has applied."""
-        model, data = self.model, self.data
-        duration, theirs = float(model.opt.timestep), data.xfrc_applied.copy()
-        data.xfrc_applied += self.wrenches
-        both = data.xfrc_applied.copy()
-        model.opt.timestep = self.length
+        opt, duration = self.model.opt, float(self.model.opt.timestep)
+        self._give()
+        self._by_hand, opt.timestep = True, self.length
         try:
-            unheard("mj_step2")(model, data)
+            unheard("mj_step2")(self.model, self.data)
         finally:
-            model.opt.timestep = duration
-            # MuJoCo resets data that has diverged. Then nothing of the script's forces is left.
-            if np.array_equal(data.xfrc_applied, both, equal_nan=True):
-                data.xfrc_applied[:] = theirs
+            self._by_hand, opt.timestep = False, duration
+            self._take()
 
     def stepped(self, duration: float) -> None:
         return
 
     def announce(self) -> None:
         stepped(self.data)
+
+    def _accelerate(self) -> None:
+        """Find the acceleration of all coordinates by everything except contacts."""
+        self._must_be_supported()
+        self.wrenches[:] = 0
+        mujoco.mj_fwdActuation(self.model, self.data)
+        mujoco.mj_fwdAcceleration(self.model, self.data)
+        mujoco.mj_fwdConstraint(self.model, self.data)
+
+    def _give(self) -> None:
+        """Apply the wrenches in addition to the forces that the script has applied."""
+        applied = self.data.xfrc_applied
+        theirs = applied.copy()
+        applied += self.wrenches
+        self._given = theirs, applied.copy()
+
+    def _take(self) -> None:
+        """Take the wrenches away again, except from bodies to which other forces have been applied since."""
+        if self._given is not None:
+            theirs, both = self._given
+            same = ((self.data.xfrc_applied == both) | np.isnan(both)).all(axis=1)
+            self.data.xfrc_applied[same] = theirs[same]
+            self._given = None
 
     def _must_be_supported(self) -> None:
         opt = self.model.opt
@@ -115,3 +176,7 @@ class MujocoStepping:
                 "VolumetricContact does not support sleeping bodies: clear mujoco.mjtEnableBit.mjENBL_SLEEP in "
                 "model.opt.enableflags"
             )
+
+
+def _nothing() -> None:
+    return
