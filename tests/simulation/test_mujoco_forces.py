@@ -12,6 +12,7 @@ import pytest
 import overlapper
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import load_scene
+from overlapper.simulation.mujoco.calls import listen
 from overlapper.simulation.mujoco.friction import friction
 from overlapper.simulation.mujoco.stepping import MujocoStepping
 from overlapper.tables.table_file import read_table
@@ -244,6 +245,35 @@ def test_bodies_of_one_tree_push_each_other_and_leave_the_momentum_of_the_tree()
     assert np.abs(data.subtree_linvel[1]).max() < 1e-9
 
 
+GLIDE = '<joint name="{0}" type="slide" axis="0 0 1"/>'
+UNSEEN = 'contype="0" conaffinity="0"'
+CARRIED = {
+    # A mass that glides along z, with a leg whose knee the ground bends back to its limit.
+    "limit": (
+        f'<body pos="0 0 .3">{GLIDE.format("z")}<geom size=".03" mass="2" {UNSEEN}/><body>'
+        '<joint axis="0 1 0" range="-5 5"/><geom size=".05" pos=".1 0 -.25" mass=".2"/></body></body>',
+        "",
+    ),
+    # A ball that glides along z. An equality hangs a mass on it.
+    "equality": (
+        f'<body pos="0 0 .05">{GLIDE.format("z")}<geom size=".05" mass=".2"/></body>'
+        f'<body pos="1 0 .5">{GLIDE.format("other")}<geom size=".05" mass="2" {UNSEEN}/></body>',
+        '<equality><joint joint1="z" joint2="other"/></equality>',
+    ),
+}
+
+
+@pytest.mark.parametrize("constraint", CARRIED)
+def test_what_a_constraint_carries_presses_with_its_weight(constraint):
+    """The solver expects the reaction of the constraint. Without it, it would expect that the body gives way."""
+    model, data = simulated(CARRIED[constraint][0], rest=CARRIED[constraint][1])
+    with pressing(model, data, friction=0, dissipation=1e-2) as contact:
+        advance(contact, 2)
+        assert data.nefc == 1 and contact.on(0)[0] == pytest.approx([0, 0, -2.2 * G], rel=1e-6, abs=1e-6)
+        assert 1e7 * contact.contacts.overlaps.volume == pytest.approx([2.2 * G], rel=1e-6)
+    assert np.abs(data.qvel).max() < 1e-9
+
+
 def test_friction_is_that_of_mujoco():
     """Priorities, dimensions, explicit pairs and the override, against the contacts that mj_collision makes."""
     rng = np.random.default_rng(7)
@@ -421,6 +451,20 @@ def test_mj_step_within_the_block_has_the_forces_of_a_step_in_one_substep():
     assert data.time == other.time and not other.xfrc_applied.any() and mujoco.get_mjcb_control() is None
 
 
+def test_mj_step_after_substeps_has_the_forces_of_a_whole_step():
+    """The length of the step enters the masses of damped joints."""
+    model, data = simulated(MECHANISM.format(0.3, 0, 0, 0.5, 2, 0.1))
+    with pressing(model, data, substeps=8) as one:
+        advance(one, 0.35)
+        other = mujoco.MjData(model)
+        mujoco.mj_copyState(model, data, other, mujoco.mjtState.mjSTATE_INTEGRATION)
+        mujoco.mj_forward(model, other)
+        with pressing(model, other) as two:
+            mujoco.mj_step(model, data)
+            mujoco.mj_step(model, other)
+            assert len(one) > 1 and one.force == pytest.approx(two.force, rel=1e-5, abs=1e-5)
+
+
 def test_only_its_own_data_is_pushed():
     model, data = resting_cube()
     other_model, other = resting_cube()
@@ -589,6 +633,18 @@ def test_a_step_in_substeps_is_one_step_for_those_who_watch():
         advance(contact, 0.005)
     assert (watch.steps, watch.time) == (5, pytest.approx(0.005))
     assert [row["step"] for row in read_table(Path("watched.csv"))] == [1, 2, 3, 4, 5]
+
+
+def test_listeners_hear_of_a_simulation_that_began_before_they_came():
+    model, data = resting_cube()
+    heard = []
+    with pressing(model, data, substeps=2) as contact:
+        contact.step()
+        unlisten = listen(lambda happening, which: heard.append((happening, which is data)))
+        contact.step()
+        unlisten()
+        contact.step()
+    assert heard == [("began", True), ("stepped", True)]
 
 
 def test_a_scene_may_ask_for_volumetric_contact():

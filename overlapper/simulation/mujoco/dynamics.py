@@ -78,8 +78,8 @@ class MujocoDynamics:
         inverse = np.empty_like(self._units)
         mujoco.mj_solveM(self._model, data, inverse, self._units)
         inverse = np.ascontiguousarray(inverse.T)
-        known = np.abs(data.qacc) < FARTHEST  # MuJoCo resets data with larger accelerations
-        self.acceleration = np.where(known, data.qacc, 0.0)
+        told = self._stepping.acceleration
+        self.acceleration = np.where(np.abs(told) < FARTHEST, told, 0.0)  # MuJoCo resets data that diverges
         for tree in self._trees:
             if damping[tree].any():
                 own = inverse[tree, : tree.stop - tree.start]
@@ -101,7 +101,8 @@ class MujocoDynamics:
         return np.array(self._data.qvel)
 
     def apply(self, wrenches: NDArray[np.float64], frames: Sequence[Pose]) -> None:
-        """Let forces and torques (n, 6) about the centres of mass act in the next step."""
+        """Let forces and torques (n, 6) about the centres of mass act in the next step, and no others."""
+        self._stepping.wrenches[:] = 0
         np.add.at(self._stepping.wrenches, self._bodies[self._move], wrenches[self._move])
 
 

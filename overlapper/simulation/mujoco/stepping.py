@@ -37,8 +37,9 @@ def _control(model: Any, data: Any) -> None:
 class MujocoStepping:
     """See `Mechanics`.
 
-    `wrenches` (b, 6) are forces and torques about the centres of mass of all bodies, for the next substep. `length` is
-    that of the last substep, s.
+    `wrenches` (b, 6) are our forces and torques about the centres of mass of all bodies, in the last substep or in the
+    one to come. `length` is that of the last substep, s. `acceleration` (c,) is that of all coordinates by everything
+    except contacts, now.
     """
 
     restored = 0  # a restored state is the state of `data`, and nothing else is kept
@@ -47,6 +48,7 @@ class MujocoStepping:
         self.model, self.data = model, data
         self.length = float(model.opt.timestep)
         self.wrenches = np.zeros((model.nbody, 6))
+        self.acceleration = np.zeros(model.nv)
         self._answer: Callable[[], None] = _nothing
         self._by_hand = False  # within a step that `prepare` and `step` make
         self._given: tuple[Array, Array] | None = None  # the script's xfrc_applied, and the same with our forces
@@ -141,12 +143,22 @@ class MujocoStepping:
         stepped(self.data)
 
     def _accelerate(self) -> None:
-        """Find the acceleration of all coordinates by everything except contacts."""
+        """Find the acceleration of all coordinates by everything except contacts.
+
+        Limits and equalities react to contacts. Their forces are those that react to the contacts of the last substep.
+        """
         self._must_be_supported()
-        self.wrenches[:] = 0
-        mujoco.mj_fwdActuation(self.model, self.data)
-        mujoco.mj_fwdAcceleration(self.model, self.data)
-        mujoco.mj_fwdConstraint(self.model, self.data)
+        model, data = self.model, self.data
+        mujoco.mj_fwdActuation(model, data)
+        mujoco.mj_fwdAcceleration(model, data)
+        self.acceleration = data.qacc_smooth.copy()
+        if not data.nefc:
+            return
+        self._give()
+        mujoco.mj_fwdAcceleration(model, data)
+        mujoco.mj_fwdConstraint(model, data)
+        self.acceleration += data.qacc - data.qacc_smooth
+        self._take()
 
     def _give(self) -> None:
         """Apply the wrenches in addition to the forces that the script has applied."""
