@@ -185,20 +185,18 @@ the world, then of its joints.)");
               "numpy.typing.ArrayLike, pivots: numpy.typing.ArrayLike, masses: numpy.typing.ArrayLike, inertias: "
               "numpy.typing.ArrayLike) -> None"));
   cls.def_prop_ro("coordinates", [](const ContactSolver& self) { return self.bodies().coordinates(); });
-  cls.def_static(
-      "of_trees", &of_trees, "coordinates"_a, "trees"_a, "moved"_a,
-      nb::sig("def of_trees(coordinates: numpy.typing.ArrayLike, trees: numpy.typing.ArrayLike, moved: "
-              "numpy.typing.ArrayLike) -> ContactSolver"),
-      R"(A solver for trees of a simulator that knows masses and motions itself and gives them to `move`.
+  cls.def_static("of_trees", &of_trees, "coordinates"_a, "trees"_a, "moved"_a,
+                 nb::sig("def of_trees(coordinates: numpy.typing.ArrayLike, trees: numpy.typing.ArrayLike, moved: "
+                         "numpy.typing.ArrayLike) -> ContactSolver"),
+                 R"(A solver for trees of a simulator that knows masses and motions itself and gives them to `move`.
 
 `coordinates` (t,) are the numbers of coordinates of the trees. `trees` (n,) is the tree of each link, -1 of a link that
 stands still. `moved` (m, 2) has a row for each coordinate that moves a link: the place of the link, and the place of
 the coordinate in the tree.)");
-  cls.def(
-      "move", &move, "linear"_a, "angular"_a, "points"_a, "inverse_mass"_a,
-      nb::sig("def move(self, linear: numpy.typing.ArrayLike, angular: numpy.typing.ArrayLike, points: "
-              "numpy.typing.ArrayLike, inverse_mass: numpy.typing.ArrayLike) -> None"),
-      R"(Take the motions and the masses of trees, before `place`.
+  cls.def("move", &move, "linear"_a, "angular"_a, "points"_a, "inverse_mass"_a,
+          nb::sig("def move(self, linear: numpy.typing.ArrayLike, angular: numpy.typing.ArrayLike, points: "
+                  "numpy.typing.ArrayLike, inverse_mass: numpy.typing.ArrayLike) -> None"),
+          R"(Take the motions and the masses of trees, before `place`.
 
 A unit of a coordinate moves its links by a row of each of three (c, 3) arrays: the velocity at a point, the angular
 velocity, and that point, in the world. `inverse_mass` (c, w) has a row for each coordinate. The row begins with the
