@@ -12,6 +12,11 @@ except ImportError:
     print(f"overlapper: the command line needs {hint('typer', 'rich')}", file=sys.stderr)
     sys.exit(2)
 
-from overlapper.cli.app import main
+try:
+    from overlapper.cli.app import main
+except KeyboardInterrupt:
+    # The imports of all commands take most of a second.
+    print("overlapper: interrupted", file=sys.stderr)
+    sys.exit(130)
 
 __all__ = ["main"]

@@ -393,6 +393,19 @@ def interrupted(*args, said, after):
     return output, complaints
 
 
+def test_ctrl_c_while_the_commands_are_imported_ends_without_a_traceback():
+    code = (
+        "import sys\n"
+        "class Interrupting:\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        "        if name == 'overlapper.cli.watch': raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Interrupting())\n"
+        "import overlapper.cli\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "overlapper: interrupted\n")
+
+
 @pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
 def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
     (tmp_path / "long.py").write_text(LONG)
