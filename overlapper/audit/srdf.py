@@ -13,6 +13,9 @@ from overlapper.whole_file import beside
 
 Names = frozenset[str]
 
+REASONS = frozenset({"Adjacent", "Never", "Always", "Default"})
+"""The reasons that MoveIt's assistant and `write_srdf` find out. People give others, such as "User"."""
+
 
 def reason(audited: PairAudit, whole: bool) -> str | None:
     """Why a pair need not be tested; None if it must be. "Never" requires that both links are modelled `whole`."""
@@ -26,12 +29,33 @@ def reason(audited: PairAudit, whole: bool) -> str | None:
 def write_srdf(audit: Audit, path: Path) -> None:
     """Write <disable_collisions> for each pair that is adjacent, never overlaps or always does.
 
-    A pair with a link that is not modelled completely is not written as never overlapping.
+    A pair with a link that is not modelled completely is not written as never overlapping. An existing SRDF file keeps
+    everything else: groups, end effectors, comments, and pairs that it disables for a reason such as "User".
+
+    Raises
+    ------
+    ValueError
+        If the file exists and is not an SRDF file, or is that of another robot. It is then unchanged.
     """
-    root = ElementTree.Element("robot", name=audit.robot.name)
+    root = extended(path, audit.robot.name)
+    kept = {frozenset((each.get("link1"), each.get("link2"))) for each in root.findall("disable_collisions")}
     for (first, second), why in _disabled(audit):
-        ElementTree.SubElement(root, "disable_collisions", link1=first, link2=second, reason=why)
+        if frozenset((first, second)) not in kept:
+            ElementTree.SubElement(root, "disable_collisions", link1=first, link2=second, reason=why)
     _write(root, path)
+
+
+def extended(path: Path, name: str) -> ElementTree.Element:
+    """What `write_srdf` keeps of a file: a new <robot> if there is no file. Errors as for `write_srdf`."""
+    if not path.is_file():
+        return ElementTree.Element("robot", name=name)
+    root = _root(path, comments=True)
+    if (other := root.get("name", name)) != name:
+        raise ValueError(f"{path} is the SRDF file of robot {other!r}, not of {name!r}")
+    for each in root.findall("disable_collisions"):
+        if each.get("reason") in REASONS:
+            root.remove(each)
+    return root
 
 
 def write_excludes(audit: Audit, path: Path) -> None:
@@ -61,17 +85,24 @@ def _write(root: ElementTree.Element, path: Path) -> None:
 
 def read_srdf(path: Path) -> dict[Names, str]:
     """The pairs that an SRDF file disables, with its reasons. OSError if the file is missing, ValueError if invalid."""
-    if path.exists() and not path.is_file():
-        raise ValueError(f"there is no SRDF file {path}")
-    try:
-        root = ElementTree.parse(path).getroot()
-    except (ElementTree.ParseError, ValueError) as error:
-        raise ValueError(f"{path} is not an SRDF file: {first_line(error)}") from error
-    if root.tag != "robot":
-        raise ValueError(f"{path} is not an SRDF file: its root is <{root.tag}>, not <robot>")
+    root = _root(path)
     pairs = [each.attrib for each in root.findall("disable_collisions")]
     if missing := [each for each in pairs if not each.get("link1") or not each.get("link2")]:
         raise ValueError(
             f"{path} is not an SRDF file: a <disable_collisions> must name link1 and link2, not {dict(missing[0])}"
         )
     return {frozenset((each["link1"], each["link2"])): each.get("reason", "") for each in pairs}
+
+
+def _root(path: Path, comments: bool = False) -> ElementTree.Element:
+    """The root of an SRDF file. OSError if the file is missing, ValueError if invalid."""
+    if path.exists() and not path.is_file():
+        raise ValueError(f"there is no SRDF file {path}")
+    try:
+        parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=comments))
+        root = ElementTree.parse(path, parser).getroot()
+    except (ElementTree.ParseError, ValueError) as error:
+        raise ValueError(f"{path} is not an SRDF file: {first_line(error)}") from error
+    if root.tag != "robot":
+        raise ValueError(f"{path} is not an SRDF file: its root is <{root.tag}>, not <robot>")
+    return root

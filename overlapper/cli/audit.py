@@ -57,7 +57,7 @@ def audit(
     expect: ExpectOption = None,
     least_depth: LeastDepthOption = 0.0,
     against: Annotated[Path | None, typer.Option(help="SRDF file whose disabled pairs are checked.")] = None,
-    srdf: Annotated[Path | None, typer.Option(help="Write an SRDF file for a motion planner.")] = None,
+    srdf: Annotated[Path | None, typer.Option(help="Write an SRDF file for a motion planner, or extend one.")] = None,
     exclude: Annotated[
         Path | None, typer.Option(help="Write the same pairs as <exclude> to an MJCF file (.xml) for MuJoCo.")
     ] = None,
@@ -119,7 +119,7 @@ def audit(
         from overlapper.audit.findings import findings, remarks
         from overlapper.audit.page import addresses, write_page
         from overlapper.audit.robot import not_modelled, read_robot
-        from overlapper.audit.srdf import read_srdf, write_excludes, write_srdf
+        from overlapper.audit.srdf import extended, read_srdf, write_excludes, write_srdf
         from overlapper.audit.table import facts, write_table
         from overlapper.simulation.bullet.model_file import NotRead
         from overlapper.tables.outputs import can_be_written
@@ -131,6 +131,8 @@ def audit(
         except NotRead as error:
             raise Refused(str(error)) from error
         must_name_some(pairs, read.link_names, "link")
+        if srdf:
+            extended(srdf, read.name)  # a file that it cannot extend is refused before the audit
         with engine as working:
             found = look(
                 read,

@@ -99,6 +99,25 @@ def test_an_srdf_file_that_disables_an_overlapping_pair_is_reported(robot, tmp_p
     assert "no joint ties them" not in said
 
 
+def test_an_srdf_file_that_exists_keeps_its_groups_comments_and_pairs_of_people(robot, tmp_path):
+    (tmp_path / "table.srdf").write_text(
+        '<robot name="made"><!-- by hand --><group name="all"><chain base_link="post" tip_link="arm"/></group>'
+        '<disable_collisions link1="plate" link2="post" reason="User"/>'
+        '<disable_collisions link1="arm" link2="wall" reason="Default"/></robot>'
+    )
+    code, _, complaints = run(robot, *FIXED, "--srdf", "table.srdf")
+    assert (code, complaints) == (0, "")
+    text = (tmp_path / "table.srdf").read_text()
+    assert "<!-- by hand -->" in text and '<chain base_link="post" tip_link="arm" />' in text
+    disabled = read_srdf(tmp_path / "table.srdf")
+    assert len(disabled) == text.count("<disable_collisions") == 9
+    assert disabled[frozenset(("plate", "post"))] == "User" and disabled[frozenset(("arm", "plate"))] == "Always"
+    assert frozenset(("arm", "wall")) not in disabled
+    again = text
+    run(robot, *FIXED, "--srdf", "table.srdf")
+    assert (tmp_path / "table.srdf").read_text() == again
+
+
 MUST_NAME = "a <disable_collisions> must name link1 and link2, not {'link1': 'arm'}"
 
 
@@ -109,6 +128,8 @@ MUST_NAME = "a <disable_collisions> must name link1 and link2, not {'link1': 'ar
         ({"expect": ["arm,roof"]}, "no link is called 'roof'"),
         ({"out": "pairs.txt"}, "--out must end in .csv, .parquet, .sqlite, not 'pairs.txt'"),
         ({"srdf": "."}, ".: Is a directory"),
+        ({"srdf": "sdf.srdf"}, "sdf.srdf is not an SRDF file: its root is <sdf>, not <robot>"),
+        ({"srdf": "other.srdf"}, "other.srdf is the SRDF file of robot 'panda', not of 'made'"),
         ({"against": "none.srdf"}, "none.srdf: No such file or directory"),
         ({"against": "table.urdf.txt"}, "table.urdf.txt is not an SRDF file: syntax error: line 1, column 0"),
         ({"against": "sdf.srdf"}, "sdf.srdf is not an SRDF file: its root is <sdf>, not <robot>"),
@@ -122,6 +143,7 @@ MUST_NAME = "a <disable_collisions> must name link1 and link2, not {'link1': 'ar
 def test_invalid_requests_are_refused_in_one_sentence(options, sentence, robot, tmp_path):
     (tmp_path / "table.urdf.txt").write_text("no XML")
     (tmp_path / "sdf.srdf").write_text("<sdf/>")
+    (tmp_path / "other.srdf").write_text('<robot name="panda"/>')
     (tmp_path / "half").write_text('<robot><disable_collisions link1="arm"/></robot>')
     urdf(tmp_path / "bare.urdf", link("a"), link("b"), joint("j", "fixed", "a", "b"))
     urdf(tmp_path / "one.urdf", link("a", ("1 1 1", "0 0 0")))
