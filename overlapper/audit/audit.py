@@ -9,7 +9,7 @@ from functools import reduce
 from operator import add
 from typing import Literal
 
-from overlapper import Batch
+from overlapper import Batch, Overlaps
 from overlapper.audit.examiner import Examiner
 from overlapper.audit.pairs import LinkPair
 from overlapper.audit.robot import Robot, shape_keys
@@ -45,7 +45,7 @@ class PairAudit:
     The pair overlapped in `met` of `asked` configurations. `status` is "never", "sometimes" or "always". `fraction` is
     the fraction among random configurations, with the bounds of its 95 % Wilson interval; None without any of these.
     `largest` is the configuration with the largest volume, summed over the pairs of shapes. `deepest` is the
-    configuration with the largest depth.
+    configuration with the largest depth. `at_rest` is True if the pair overlaps in configuration 0, the rest pose.
     """
 
     pair: LinkPair
@@ -56,6 +56,7 @@ class PairAudit:
     fraction: tuple[float, float, float] | None
     largest: Pose | None
     deepest: Pose | None
+    at_rest: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +99,8 @@ def audit(
         places = (int(tally.volume.at[k]), int(tally.depth.at[k])) if met else ()
         largest, deepest = [sights.of(pair, place) for place in places] or (None, None)
         names = robot.link_names[pair.links[0]], robot.link_names[pair.links[1]]
-        audited.append(PairAudit(pair, names, status, asked, met, fraction, largest, deepest))
+        at_rest = bool(met) and sights.meet(pair, 0)
+        audited.append(PairAudit(pair, names, status, asked, met, fraction, largest, deepest, at_rest))
     return Audit(robot, sampling, audited)
 
 
@@ -133,11 +135,15 @@ class _Sights:
         self.keys = shape_keys(examiner.robot)
 
     def of(self, pair: LinkPair, number: int) -> Pose:
+        (contact,) = link_contacts(Contacts(self.keys, self._overlaps(pair, number)))
+        return Pose(number, self._examiner.sampling.configuration(number), contact)
+
+    def meet(self, pair: LinkPair, number: int) -> bool:
+        return bool(self._examiner.counts(self._overlaps(pair, number)).any())
+
+    def _overlaps(self, pair: LinkPair, number: int) -> Overlaps:
         examiner = self._examiner
-        values = examiner.sampling.configuration(number)
-        (positions,), (orientations,) = examiner.kinematics.poses(values[None])
-        found = self._batch.overlaps(
+        (positions,), (orientations,) = examiner.kinematics.poses(examiner.sampling.configuration(number)[None])
+        return self._batch.overlaps(
             positions, orientations, examiner.shape_pairs(pair), examiner.tolerance, separated=False
         )
-        (contact,) = link_contacts(Contacts(self.keys, found))
-        return Pose(number, values, contact)

@@ -94,11 +94,15 @@ class Examiner:
             self.tolerance,
             separated=False,
         )
-        counts = (found.status == Overlaps.OVERLAPPING) & (found.depth > self.least_depth)
+        counts = self.counts(found)
         first, second = found.pairs[counts].T
         pairs = self._pair_of[first % k, second % k]
         seen = ShapeOverlaps(pairs, first // k, found.volume[counts], found.depth[counts])
         return seen.tally(asked, numbers, self.sampling.first_random)
+
+    def counts(self, found: Overlaps) -> NDArray[np.bool_]:
+        """Which rows count as overlaps."""
+        return np.asarray((found.status == Overlaps.OVERLAPPING) & (found.depth > self.least_depth))
 
     def _near(self, positions: Array, orientations: Array, wanted: Counts) -> tuple[Counts, Counts]:
         """Configurations (m,) and pairs of shapes (m,), among the `wanted` pairs, whose bounding balls meet."""

@@ -23,14 +23,16 @@ def reason(audited: PairAudit, whole: bool) -> str | None:
         return "Adjacent"
     if audited.status == "never" and not whole:
         return None
-    return {"never": "Never", "always": "Always"}.get(audited.status)
+    rare = "Default" if audited.at_rest else None
+    return {"never": "Never", "always": "Always"}.get(audited.status, rare)
 
 
 def write_srdf(audit: Audit, path: Path) -> None:
-    """Write <disable_collisions> for each pair that is adjacent, never overlaps or always does.
+    """Write <disable_collisions> for each pair that is adjacent, never overlaps, or always or at rest does.
 
-    A pair with a link that is not modelled completely is not written as never overlapping. An existing SRDF file keeps
-    everything else: groups, end effectors, comments, and pairs that it disables for a reason such as "User".
+    The reason of pairs that overlap in the rest pose, but not always, is "Default", as in MoveIt. A pair with a link
+    that is not modelled completely is not written as never overlapping. An existing SRDF file keeps everything else:
+    groups, end effectors, comments, and pairs that it disables for a reason such as "User".
 
     Raises
     ------

@@ -12,8 +12,9 @@ from overlapper.audit.robot import not_modelled
 from overlapper.tables.table import Row, Value
 from overlapper.tables.table_file import TABLES, origin
 
-# Every column, in order, with its type; the unit is in the name. `adjacent` is 1 or 0. Joints are JSON, by name, in rad
-# and m. `page` links to the pose of the largest volume. `not_modelled` says which shapes of the links are left out.
+# Every column, in order, with its type; the unit is in the name. `adjacent` is 1 or 0, and so is `at_rest`:
+# whether the pair overlaps in configuration 0. Joints are JSON, by name, in rad and m. `page` links to the pose of the
+# largest volume. `not_modelled` says which shapes of the links are left out.
 COLUMNS: dict[str, type] = {
     "nameA": str,
     "nameB": str,
@@ -21,6 +22,7 @@ COLUMNS: dict[str, type] = {
     "status": str,
     "asked": int,
     "overlapping": int,
+    "at_rest": int,
     "fraction": float,
     "fraction_low": float,
     "fraction_high": float,
@@ -66,6 +68,7 @@ def _row(audit: Audit, audited: PairAudit, page: Mapping[tuple[int, int], str]) 
     fraction: tuple[Value, ...] = audited.fraction or (None,) * 3
     row: Row = {"nameA": audited.names[0], "nameB": audited.names[1], "adjacent": int(audited.pair.adjacent)}
     row |= {"status": audited.status, "asked": audited.asked, "overlapping": audited.met}
+    row["at_rest"] = int(audited.at_rest)
     row |= dict(zip(("fraction", "fraction_low", "fraction_high"), fraction))
     for name, pose in (("volume", audited.largest), ("depth", audited.deepest)):
         row[f"{name}_configuration"] = pose.number if pose else None

@@ -51,6 +51,7 @@ def test_an_audit_is_written_as_json_table_srdf_and_page(robot, tmp_path):
     pairs = {(each["nameA"], each["nameB"]): each for each in found["pairs"]}
     wall = pairs["arm", "wall"]
     assert (wall["status"], wall["adjacent"], wall["asked"], len(pairs)) == ("sometimes", 0, COUNT, 10)
+    assert (wall["at_rest"], pairs["arm", "plate"]["at_rest"]) == (0, 1)
     assert 0 < wall["fraction_low"] < wall["fraction"] < wall["fraction_high"] < 1
     assert 1.2 < wall["volume_joints"]["turn"] < 1.9 and 0.005 < wall["volume_m3"] < 0.008 and wall["depth_m"] > 0.1
     assert pairs["post", "arm"]["volume_m3"] is None
@@ -116,6 +117,17 @@ def test_an_srdf_file_that_exists_keeps_its_groups_comments_and_pairs_of_people(
     again = text
     run(robot, *FIXED, "--srdf", "table.srdf")
     assert (tmp_path / "table.srdf").read_text() == again
+
+
+def test_a_pair_that_overlaps_at_rest_but_not_always_is_disabled_by_default(tmp_path):
+    robot = turntable(tmp_path / "at_wall.urdf", 0.6, 2.6)  # joints with such limits rest halfway between them
+    _, said, complaints = run(robot, *FIXED, "--json", "--srdf", "made.srdf")
+    at_rest = {(each["nameA"], each["nameB"]): (each["status"], each["at_rest"]) for each in json.loads(said)["pairs"]}
+    assert complaints == "" and at_rest["arm", "wall"] == ("sometimes", 1) and at_rest["post", "arm"] == ("never", 0)
+    disabled = read_srdf(tmp_path / "made.srdf")
+    assert disabled[frozenset(("arm", "wall"))] == "Default" and disabled[frozenset(("arm", "plate"))] == "Always"
+    code, said, _ = run(robot, *FIXED, "--against", "made.srdf")
+    assert code == 1 and "arm and wall are disabled by the SRDF file as 'Default', and overlap in " in said
 
 
 MUST_NAME = "a <disable_collisions> must name link1 and link2, not {'link1': 'arm'}"

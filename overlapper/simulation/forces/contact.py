@@ -93,8 +93,8 @@ class VolumetricContact:
     In MuJoCo, all other forces are known, because MuJoCo computes them first. Its contacts can only be turned off for
     all pairs at once, so `pairs` must contain all pairs that it lets collide. The flag belongs to the model: other data
     of the same model have no contacts within the `with`, either. `data.xfrc_applied` keeps the forces of the script.
-    After `step()`, `data` has the poses from before the last integration, as after mj_step. A loop of mj_step within the
-    `with` works without a change. Each of its steps is one substep.
+    After `step()`, `data` has the poses from before the last integration, as after mj_step. A loop of mj_step within
+    the `with` works without a change. Each of its steps is one substep.
 
     A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning. The other bodies continue.
 
