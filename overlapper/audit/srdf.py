@@ -23,8 +23,8 @@ def reason(audited: PairAudit, whole: bool) -> str | None:
         return "Adjacent"
     if audited.status == "never" and not whole:
         return None
-    rare = "Default" if audited.at_rest else None
-    return {"never": "Never", "always": "Always"}.get(audited.status, rare)
+    sometimes = "Default" if audited.at_rest else None
+    return {"never": "Never", "always": "Always"}.get(audited.status, sometimes)
 
 
 def write_srdf(audit: Audit, path: Path) -> None:
