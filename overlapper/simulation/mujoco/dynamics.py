@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
@@ -15,11 +15,18 @@ from overlapper.simulation.model import Array
 from overlapper.simulation.mujoco.friction import friction
 from overlapper.simulation.mujoco.geoms import collidable
 
-if TYPE_CHECKING:
-    from overlapper.simulation.mujoco.stepping import MujocoStepping
-
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 NOT_IMPLICIT = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
+
+
+class Step(Protocol):
+    """The substep that a simulation makes. See `MujocoStepping`."""
+
+    model: Any
+    data: Any
+    length: float
+    wrenches: Array
+    acceleration: Array
 
 
 class MujocoDynamics:
@@ -28,7 +35,7 @@ class MujocoDynamics:
     MuJoCo's own mass matrix and motion axes are used. So armature, ball joints and several joints of a body count.
     """
 
-    def __init__(self, stepping: MujocoStepping, bodies: Sequence[int]) -> None:
+    def __init__(self, stepping: Step, bodies: Sequence[int]) -> None:
         self._stepping, self._model, self._data = stepping, stepping.model, stepping.data
         model, known = self._model, set(bodies)
         owner = model.geom_bodyid
