@@ -1,6 +1,5 @@
 """Hypothesis draws the same examples on every run; `--hypothesis-profile=explore` looks further, with new ones."""
 
-import os
 import signal
 from pathlib import Path
 
@@ -20,13 +19,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 HERE = Path(__file__).parent
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers():
-    """Two workers more than processors: tests of sweeps, pages and signals mostly wait for other processes."""
-    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return processors + 2
 
 
 def pytest_collection_modifyitems(items):
