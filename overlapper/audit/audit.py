@@ -99,7 +99,7 @@ def audit(
         places = (int(tally.volume.at[k]), int(tally.depth.at[k])) if met else ()
         largest, deepest = [sights.of(pair, place) for place in places] or (None, None)
         names = robot.link_names[pair.links[0]], robot.link_names[pair.links[1]]
-        at_rest = bool(met) and sights.meet(pair, 0)
+        at_rest = status == "always" or (status == "sometimes" and sights.meet(pair, 0))
         audited.append(PairAudit(pair, names, status, asked, met, fraction, largest, deepest, at_rest))
     return Audit(robot, sampling, audited)
 
