@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cfloat>
-#include <functional>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
@@ -211,7 +210,6 @@ struct SharedPlanes {
   };
   struct Beside {
     int vertex, other, edge;
-    bool operator<(const Beside& o) const { return std::pair(vertex, other) < std::pair(o.vertex, o.other); }
   };
   std::vector<Base> bases;
   std::vector<int> sides;    ///< for each corner of a ring, the plane along the facet's normal through its next edge
@@ -230,18 +228,19 @@ class RoundedCutter {
     shared_->sides.assign(hull_.ring.size(), kNotPlaced);
     shared_->ends.assign(hull_.edges.size(), {kNotPlaced, kNotPlaced, {}});
     shared_->raised.assign(hull_.vertices.size(), false);
-  }
-
-  void cut_core() {
-    cutter_.begin();
-    for (int f = 0; f < static_cast<int>(hull_.planes.size()); ++f) {
+    for (int f = 0; f < facets(); ++f) {
       cancellation_point();
       const auto [least, most] = cutter_.heights(hull_.planes[f]);
       shared_->bases.push_back({least, most, kNotPlaced, {}});
       if (!raised(f)) continue;
       for (const int v : hull_.facet(f)) shared_->raised[v] = true;
-      if (!cutter_.empty()) cutter_.cut_inside(base(f).plane);
     }
+  }
+
+  void cut_core() {
+    cutter_.begin();
+    for (int f = 0; f < facets() && !cutter_.empty(); ++f)
+      if (raised(f)) cutter_.cut_inside(base(f).plane);
     cutter_.end();
   }
 
@@ -250,20 +249,31 @@ class RoundedCutter {
   bool cut_mitred() {
     constexpr double kSharp = -0.5;
     cutter_.begin();
-    for (int f = 0; f < static_cast<int>(hull_.planes.size()); ++f) {
-      cancellation_point();
-      const auto [least, most] = cutter_.heights(hull_.planes[f]);
-      shared_->bases.push_back({least, most, kNotPlaced, {}});
-      if (raised(f))
-        for (const int v : hull_.facet(f)) shared_->raised[v] = true;
-      if (!(most < radius_)) cutter_.face_beyond(base(f).plane, radius_);
-    }
+    for (int f = 0; f < facets(); ++f)
+      if (!(shared_->bases[f].most < radius_)) cutter_.face_beyond(base(f).plane, radius_);
     cutter_.end();
     return std::ranges::none_of(hull_.edges, [&](const Edge& edge) {
       return dot(hull_.planes[edge.left].normal, hull_.planes[edge.right].normal) < kSharp &&
              (raised(edge.left) || raised(edge.right));
     });
   }
+
+  void cut_facets() {
+    for (int f = 0; f < facets(); ++f) cut_facet(f);
+  }
+  /// A wedge of a cylinder along each edge, and of a ball at each vertex.
+  void cut_edges_and_vertices() {
+    for (int e = 0; e < static_cast<int>(hull_.edges.size()); ++e) {
+      cancellation_point();
+      cut_edge(e);
+    }
+    cut_vertices();
+  }
+
+ private:
+  static constexpr int kNotPlaced = -1;
+
+  int facets() const { return static_cast<int>(hull_.planes.size()); }
 
   /// A prism on the facet.
   void cut_facet(int f) {
@@ -307,18 +317,14 @@ class RoundedCutter {
     cutter_.end();
   }
 
-  /// A wedge of a ball at each vertex.
   void cut_vertices() {
     std::vector<SharedPlanes::Beside>& all = shared_->beside;
-    std::ranges::sort(all, std::less{});
+    std::ranges::sort(all, {}, [](const SharedPlanes::Beside& b) { return std::pair(b.vertex, b.other); });
     for (size_t i = 0, end; i < all.size(); i = end) {
       for (end = i + 1; end < all.size() && all[end].vertex == all[i].vertex;) ++end;
       cut_vertex(std::span(all).subspan(i, end - i));
     }
   }
-
- private:
-  static constexpr int kNotPlaced = -1;
 
   /// Whether the region may reach beyond the facet.
   bool raised(int f) const { return !(shared_->bases[f].most < 0); }
@@ -383,9 +389,9 @@ class RoundedCutter {
 
   bool inexact(int f) const { return hull_.facet_corners[f][0] < 0; }
 
-  /// A prism ends along the normal of its facet. The ball at a corner ends across the two edges there. If the plane of
-  /// the facet does not contain these edges, the pieces differ by the area between the normal and the great circles of
-  /// both ends on the unit sphere.
+  /// A prism ends along the normal of its facet. The ball at a corner ends across the two edges there. The plane of the
+  /// facet may miss these edges. On the unit sphere, the pieces then differ by an area: it lies between the normal and
+  /// the great circles of both ends.
   void charge_corners(std::span<const int> ring, Vec3 normal) {
     for (size_t i = 0; i < ring.size(); ++i) {
       const Vec3 at = hull_.vertices[ring[i]];
@@ -419,13 +425,7 @@ class RoundedCutter {
 void RoundedHull::give_pieces(Cutter& cutter) const {
   cutter.off(core.unexact());
   RoundedCutter all(*this, cutter, cutter.region(radius));
-  all.cut_core();
-  for (int f = 0; f < core.facet_count(); ++f) all.cut_facet(f);
-  for (int e = 0; e < static_cast<int>(core.edges().size()); ++e) {
-    cancellation_point();
-    all.cut_edge(e);
-  }
-  all.cut_vertices();
+  all.cut_core(), all.cut_facets(), all.cut_edges_and_vertices();
 }
 
 bool RoundedHull::give_mitred(Cutter& cutter) const {
@@ -433,11 +433,7 @@ bool RoundedHull::give_mitred(Cutter& cutter) const {
   const Vec3 far{kInfinity, kInfinity, kInfinity};
   RoundedCutter all(*this, cutter, {-far, far});
   if (!all.cut_mitred()) return false;
-  for (int e = 0; e < static_cast<int>(core.edges().size()); ++e) {
-    cancellation_point();
-    all.cut_edge(e);
-  }
-  all.cut_vertices();
+  all.cut_edges_and_vertices();
   return true;
 }
 

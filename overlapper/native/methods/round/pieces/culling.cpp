@@ -16,17 +16,23 @@ constexpr size_t kMostCorners = 512;
 
 }  // namespace
 
-Culling::PlainRound::PlainRound(const Round& round) : radius(round.radius) {
+PlainRound::PlainRound(const Round& round) : radius(round.radius) {
   if (!round.ball) axis = rounded(round.axis);
   centre = rounded(round.ball ? round.centre : foot(round));
 }
 
-Vec3 Culling::PlainRound::outward(Vec3 point) const {
+Vec3 PlainRound::outward(Vec3 point) const {
   Vec3 from = point - centre;
   // If the point is far along the axis, the first subtraction leaves rounding.
   for (int again = 0; again < 2; ++again) from -= dot(from, axis) * axis;
   const double length = std::sqrt(norm2(from));
   return length > 0 ? from / length : Vec3{};
+}
+
+bool PlainRound::misses(const EnclosingPolytope& polytope, Vec3 middle, double margin) const {
+  if (!(radius > 0)) return false;
+  const Vec3 normal = outward(middle);
+  return normal != Vec3{} && polytope.least(normal) > reach(normal) + margin;
 }
 
 void Culling::look_at(const Pieces& a, const Pieces& b, const EnclosingPolytope& common) {
@@ -139,18 +145,12 @@ bool Culling::keep_walls(const EnclosedBody& side, int piece, const EnclosedPiec
   return true;
 }
 
-bool Culling::beyond(const PlainRound& round, const EnclosingPolytope& other, Vec3 middle) const {
-  if (!(round.radius > 0)) return false;
-  const Vec3 normal = round.outward(middle);
-  return normal != Vec3{} && other.least(normal) > round.reach(normal) + margin_;
-}
-
 bool Culling::meet(int p, int q, Meeting& meeting) const {
   const EnclosedPiece &one = a_.parts[p], &two = b_.parts[q];
   meeting.p = p, meeting.q = q, meeting.walls.clear();
   if (!keep_walls(a_, p, two, meeting.of_p, meeting.walls) || !keep_walls(b_, q, one, meeting.of_q, meeting.walls))
     return false;
-  return !beyond(one.round, two.around, two.middle) && !beyond(two.round, one.around, one.middle);
+  return !one.round.misses(two.around, two.middle, margin_) && !two.round.misses(one.around, one.middle, margin_);
 }
 
 bool Culling::share(const Meeting& meeting, EnclosingPolytope& polytope) const {
@@ -182,7 +182,8 @@ bool Culling::share(const Meeting& meeting, EnclosingPolytope& polytope) const {
 
 bool Culling::outside(const EnclosingPolytope& polytope, const Meeting& meeting) const {
   const Vec3 middle = polytope.middle();
-  return beyond(a_.parts[meeting.p].round, polytope, middle) || beyond(b_.parts[meeting.q].round, polytope, middle);
+  return a_.parts[meeting.p].round.misses(polytope, middle, margin_) ||
+         b_.parts[meeting.q].round.misses(polytope, middle, margin_);
 }
 
 }  // namespace overlapper::pieces

@@ -8,6 +8,20 @@
 
 namespace overlapper::pieces {
 
+/// A ball, or a cylinder with the point of its axis nearest to the origin. Not used if the radius is 0.
+struct PlainRound {
+  Vec3 centre, axis;
+  double radius = 0;
+
+  PlainRound() = default;
+  explicit PlainRound(const Round& round);
+  /// From the centre or the axis to a point; unit, or zero.
+  Vec3 outward(Vec3 point) const;
+  double reach(Vec3 outward_normal) const { return dot(outward_normal, centre) + radius; }
+  /// Whether a polytope lies beyond the plane that touches the round beside the polytope's middle.
+  bool misses(const EnclosingPolytope& polytope, Vec3 middle, double margin) const;
+};
+
 /// Finds the pairs of pieces of two bodies that may share something, and the walls that matter for each pair. It
 /// compares polytopes that enclose the pieces within a polytope around the common set.
 class Culling {
@@ -35,17 +49,6 @@ class Culling {
   bool outside(const EnclosingPolytope& polytope, const Meeting& meeting) const;
 
  private:
-  /// A ball, or a cylinder with the point of its axis nearest to the origin. Not used if the radius is 0.
-  struct PlainRound {
-    Vec3 centre, axis;
-    double radius = 0;
-
-    PlainRound() = default;
-    explicit PlainRound(const Round& round);
-    /// From the centre or the axis to a point; unit, or zero.
-    Vec3 outward(Vec3 point) const;
-    double reach(Vec3 outward_normal) const { return dot(outward_normal, centre) + radius; }
-  };
   struct EnclosedPiece {
     EnclosingPolytope around;
     PlainRound round;
@@ -72,7 +75,6 @@ class Culling {
   bool cut_around(const Pieces& pieces, const Piece& piece);
   bool keep_walls(const EnclosedBody& side, int piece, const EnclosedPiece& other, std::vector<int>& kept,
                   std::vector<Wall>& walls) const;
-  bool beyond(const PlainRound& round, const EnclosingPolytope& other, Vec3 middle) const;
 
   /// The interval of a piece along the axis of the sweep.
   struct Swept {

@@ -26,8 +26,8 @@ void EnclosingPolytope::become(const Bounds& box) {
 
 namespace {
 
-/// Memory for a cut: for each corner what is left to the plane, the removed corners, and the edges across the plane
-/// from a corner that stays to a removed one.
+/// Memory for a cut. `left` is the distance of each corner from the plane. A crossing is an edge across the plane, from
+/// a corner that stays to a removed one.
 struct CutScratch {
   struct Crossing {
     int inner, outer;

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "geometry/cancellation.h"
+#include "methods/round/pieces/culling.h"
 #include "methods/round/pieces/piece.h"
 
 namespace overlapper::pieces {
@@ -15,17 +16,6 @@ constexpr int kMostFaces = 64;
 bool meet(const Bounds& a, const Bounds& b) {
   return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y && b.lower.y <= a.upper.y &&
          a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
-}
-
-/// Whether the polytope is certainly outside the round, by the plane that touches the round beside the polytope.
-bool misses(const Round& round, const EnclosingPolytope& polytope) {
-  const Vec3 axis = round.ball ? Vec3{} : rounded(round.axis), centre = rounded(round.centre);
-  Vec3 from = polytope.middle() - centre;
-  from -= dot(from, axis) * axis;
-  const double length = norm(from);
-  if (!(length > 0)) return false;
-  const Vec3 normal = from / length;
-  return polytope.least(normal) > (dot(normal, centre) + round.radius) + 1e-13 * polytope.extent();
 }
 
 /// Cuts a polytope by walls; the first has this number. False if nothing is left.
@@ -109,7 +99,10 @@ bool Mitred::add_both(const Slot& one, const Slot& other, const PieceSetting& se
 
 bool Mitred::add_rounds(std::span<const Round> rounds, const EnclosingPolytope& polytope, const PieceSetting& setting,
                         Sums& sums) {
-  if (std::ranges::any_of(rounds, [&](const Round& round) { return misses(round, polytope); })) return true;
+  const Vec3 middle = polytope.middle();
+  const double margin = 1e-13 * polytope.extent();
+  const auto missed = [&](const Round& round) { return PlainRound(round).misses(polytope, middle, margin); };
+  if (std::ranges::any_of(rounds, missed)) return true;
   if (rounds.size() == 1) return add_in_polytope(&rounds[0], polytope, distinct_, setting, sums);
   parts_.resize(1);
   parts_[0].polytope = polytope;

@@ -10,9 +10,9 @@
 
 namespace overlapper::pieces {
 
-/// Measures what two mitred bodies share. The common part of both mitred offsets is a polytope. What the rounds of the
-/// first body leave out of it is subtracted, then what the rounds of the second body leave out, and what both leave out
-/// is added again. Edges and vertices far from each other have nothing in common, so there are few terms.
+/// Measures the common part of two mitred bodies. Both mitred offsets share a polytope. The parts of it outside the
+/// rounds of either body are subtracted. The parts outside rounds of both bodies are added again. Edges and vertices
+/// far from each other share no part, so there are few terms.
 class Mitred {
  public:
   /// The pieces of both bodies by cut_mitred(). `around` contains the common part of the mitred offsets, and its faces
