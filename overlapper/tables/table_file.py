@@ -411,6 +411,8 @@ class SqliteTable:
                 # With a log, this loses no transaction to a kill and corrupts nothing in a power cut, and waits for no
                 # disk.
                 self._connection.execute("PRAGMA synchronous = NORMAL")
+                # One transaction, so that a killed run leaves both tables or neither. Python begins none for CREATE.
+                self._connection.execute("BEGIN")
                 self._connection.execute(f"CREATE TABLE overlaps ({declared})")
                 self._connection.execute("CREATE TABLE metadata (name TEXT PRIMARY KEY, value TEXT)")
                 self._connection.executemany("INSERT INTO metadata VALUES (?, ?)", (metadata or {}).items())

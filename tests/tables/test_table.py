@@ -432,3 +432,19 @@ def test_a_missing_table_is_reported_as_no_file(tmp_path, ending):
     for read in (read_table, read_metadata):
         with pytest.raises(FileNotFoundError):
             read(tmp_path / f"none{ending}")
+
+
+def test_a_database_gets_its_tables_and_metadata_at_once(tmp_path):
+    """A run may be killed between any two statements."""
+    seen = []
+
+    class Watched(dict):
+        def items(self):
+            with closing(sqlite3.connect(tmp_path / "run.unfinished.sqlite")) as other:
+                seen.extend(other.execute("SELECT name FROM sqlite_master"))
+            return super().items()
+
+    table = TABLES[".sqlite"](tmp_path / "run.sqlite", Watched(METADATA))
+    assert seen == []
+    table.close()
+    assert read_metadata(tmp_path / "run.sqlite").items() > METADATA.items()
