@@ -286,7 +286,8 @@ PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double toleran
   result.region = region_of(common.part);
   result.region->facets_touched = planes;
   // If rounding has turned a thin polytope inside out, it counts as flat.
-  if (!(measure(*result.region, bodies).measures.volume > 0)) return {Status::kTouching, std::nullopt};
+  const Measures measures = measure(*result.region, bodies).measures;
+  if (!(measures.volume > 0 && measures.area > 0)) return {Status::kTouching, std::nullopt};
   return result;
 }
 

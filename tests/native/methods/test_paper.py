@@ -135,3 +135,20 @@ def test_a_polytope_that_rounding_turned_inside_out_is_not_a_solid():
     answer = overlap(*thick_and_thin, tolerance=0.1, method="paper")
     assert (answer.status, answer.volume) == ("touching", 0)
     assert overlap(*thick_and_thin).status == "overlapping"
+
+
+def test_an_overlap_of_needles_has_a_volume_and_an_area():
+    needle = Placed(
+        Capsule(2.7284841053187847e-12, 0.75),
+        (-0.75, -1.3969838619232178e-09, 0),
+        (0, -2.9802322387695312e-08, -9.0949470177292824e-13, -1.4901161193847656e-08),
+    )
+    ball = Placed(Capsule(0.7176470588235293, 1.4901161193847656e-08), 3 * (-1.4901161193847656e-08,))
+    assert overlap(ball, needle, tolerance=0.1, method="paper").status == "touching"  # its area came out negative
+    rng = np.random.default_rng(5)
+    for _ in range(1_000):
+        needle = Placed(Capsule(10 ** rng.uniform(-13, -6), 1), rng.normal(size=3), quaternion(rng))
+        common = overlap(Sphere(2), needle, tolerance=0.1, method="paper")
+        if common.status == "overlapping":
+            assert common.volume > 0
+            assert common.area > 0
