@@ -43,6 +43,12 @@ def watch(
     ] = None,
     *,
     every: Annotated[int, typer.Option(min=1, help="Measure one step in this many.")] = 1,
+    rate: Annotated[
+        float,
+        typer.Option(
+            min=0.001, help="Most measurements a second of a simulation in real time, which is held meanwhile."
+        ),
+    ] = 60,
     names: Annotated[
         list[str] | None,
         typer.Option("--name", metavar="BODY=NAME", help="Name of a body, by its number. May be repeated."),
@@ -77,7 +83,7 @@ def watch(
     if not script.is_file():
         raise Refused(f"there is no script {script}")
     asked = replace(asked, pairs=asked.pairs or "simulated")
-    how = {"every": every, **settings_of(asked, modelled), "per": files.per, "check": files.check}
+    how = {"every": every, "rate": rate, **settings_of(asked, modelled), "per": files.per, "check": files.check}
     how["names"] = _named(names or ())
     try:
         from overlapper.reference import Fcl
@@ -176,7 +182,8 @@ def _tell(watches: Watches, not_watched: Sequence[str], how: Mapping[str, Any], 
         say(f"overlapper: {sentence}", sys.stderr)
     if as_json:
         simulations = [
-            watch.summary.as_dict() | {"measured": watch.measured, "written": [str(path) for path in watch.written]}
+            watch.summary.as_dict()
+            | {"measured": watch.measured, "sampled": watch.sampled, "written": [str(path) for path in watch.written]}
             for watch in watches.all
         ]
         told = {"settings": how, "simulations": simulations, "not_watched": not_watched, "finished": finished}
@@ -197,6 +204,9 @@ def _show(watches: Watches, interrupted: bool) -> None:
         )
         for line in remarks(summary):
             say(line, sys.stderr)
+        if watch.sampled:
+            sampled = f"{watch.sampled} samples of a simulation in real time, which was held meanwhile"
+            say(f"{sampled}: at most {watch.rate:g} a second.", sys.stderr)
         if watch.every > 1:
             say(f"One step in {watch.every} was measured, {watch.measured} of {watch.steps}.", sys.stderr)
         for path in watch.written:
@@ -237,5 +247,5 @@ def _steps(watches: Watches) -> str:
         return f"made {watches.steps} steps, fewer than --every"
     if watches.stepped_elsewhere or watches.loaded_elsewhere:
         return "made no step in its own process"
-    clock = ", and simulations in real time are not stepped by calls" if watches.in_real_time else ""
+    clock = ", and pybullet.DIRECT has no simulation in real time" if watches.without_real_time else ""
     return f"never called pybullet.stepSimulation or mujoco.mj_step in its own process{clock}"

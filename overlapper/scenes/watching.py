@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import threading
+import time
 import warnings
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -44,8 +46,12 @@ class Watch:
     the client disconnects. After an error they stay where they are, and `written` names them.
 
     The watch notices calls of `pybullet.stepSimulation` and `mujoco.mj_step`. It does not notice calls by a name that
-    was imported from these modules earlier, steps in other processes, and steps in real time. If a step cannot be
-    measured or written, the call that made the step raises the error, and the watch ends.
+    was imported from these modules earlier, and steps in other processes. If a step cannot be measured or written, the
+    call that made the step raises the error, and the watch ends.
+
+    After `pybullet.setRealTimeSimulation(1)`, a thread measures `rate` times a second and counts each measurement as a
+    step. The simulation is held meanwhile, so that all poses are of one moment. Its time is therefore less than that of
+    the clock. `close()` raises the error of a failed measurement.
 
     pybullet cannot be asked for pair filters, the filter mode, self-collision, height fields and files. They are known
     if they were set after the watch began, or if `recorder` has noted them.
@@ -60,6 +66,8 @@ class Watch:
         Page to write, for a browser.
     every : int, default 1
         Measure one step in this many.
+    rate : float, default 60
+        Most measurements a second, 1/s, of a simulation that runs in real time.
     pairs : {'simulated', 'all'} or list of pairs, default 'simulated'
         The pairs to measure, as in `Bodies.pairs`.
     surface : {'nominal', 'margin'}, default 'nominal'
@@ -102,6 +110,7 @@ class Watch:
         html: str | Path | None = None,
         *,
         every: int = 1,
+        rate: float = 60,
         pairs: Among = "simulated",
         surface: Surface = "nominal",
         concave: Concave = "decompose",
@@ -118,6 +127,8 @@ class Watch:
         of_engine = engine_of(engine or engine_that_has(physicsClientId))
         if whole(every, "every") < 1:
             raise ValueError(f"every must be a number of steps from 1, not {every}")
+        if not 0 < rate < math.inf:
+            raise ValueError(f"rate must be a number of measurements a second above 0, not {rate!r}")
         if check not in (None, "fcl"):
             raise ValueError(f"check must be 'fcl' or None, not {check!r}")
         if per not in get_args(Per):
@@ -127,11 +138,13 @@ class Watch:
         self.physicsClientId = physicsClientId
         self.out, self.html = (Path(path) if path else None for path in (out, html))
         can_be_written(self.out, self.html)
-        self.every, self._per = every, per
+        self.every, self.rate, self._per = every, rate, per
         self.steps, self.time = 0, 0.0
         """Number of steps since the watch began, measured or not, and their simulated time, s."""
         self.measured = 0
         """The number of steps that were measured."""
+        self.sampled = 0
+        """How many of the steps are samples of a simulation that ran in real time."""
         self.summary = Summary(name)
         self.written: list[Path] = []
         """The files that were written, known when the watch is over."""
@@ -144,6 +157,9 @@ class Watch:
         self._take: Callable[[Frame[AnyBodies]], None] | None = None
         self._rhythm = 0, 0.0, 0.0  # steps and time at the last change of the time step, and the time step
         self._lock = threading.RLock()
+        self._sampler: threading.Thread | None = None
+        self._enough = threading.Event()  # ends the sampler
+        self._error: Exception | None = None  # of the sampler
         self._process = os.getpid()
         self._unlisten = of_engine.listen(self._hear)
 
@@ -154,8 +170,37 @@ class Watch:
         if happening == "stepped":
             with self._lock:
                 self._stepped()
+        elif happening == "real time begins" and not self._sampler:
+            self._enough.clear()
+            self._sampler = threading.Thread(target=self._sample, daemon=True)
+            self._sampler.start()
+        elif happening == "real time ends":
+            self._end_real_time()
         elif happening == "ended":
             self.close()
+
+    def _sample(self) -> None:
+        last = due = time.monotonic()
+        while not self._enough.wait(max(0, due - time.monotonic())):
+            due = max(due + 1 / self.rate, time.monotonic())
+            try:
+                with self._lock, self._simulation.held():
+                    self.steps, self.sampled = self.steps + 1, self.sampled + 1
+                    self.time += time.monotonic() - last
+                    if self.steps % self.every == 0:
+                        self._measure()
+                last = time.monotonic()
+            except Exception as error:
+                if self._simulation.running:
+                    self._error = error
+                return
+
+    def _end_real_time(self) -> None:
+        if self._sampler:
+            self._enough.set()
+            self._sampler.join()
+            self._sampler = None
+            self._rhythm = 0, 0.0, 0.0
 
     def _stepped(self) -> None:
         seconds = self._simulation.time_step
@@ -203,7 +248,14 @@ class Watch:
         return {body: name for body, name in (self._names or {}).items() if body not in there}
 
     def close(self) -> None:
-        """End the watch and put the files in their places. OSError if this fails."""
+        """End the watch and put the files in their places. OSError if this fails.
+
+        Raises the error that has ended the measurements in real time, if there was one.
+        """
+        self._end_real_time()
+        if self._error:
+            self.leave()
+            raise self._error
         self._end()
         self._files.close()
 
@@ -214,6 +266,7 @@ class Watch:
 
     def _end(self) -> None:
         self.open = False
+        self._end_real_time()
         self._unlisten()
         self._simulation.leave()
         if self._bodies:
@@ -247,8 +300,8 @@ class Watches:
         self.failed: list[tuple[Watch, Exception]] = []
         self.steps = 0
         """The number of steps of all simulations, measured or not."""
-        self.in_real_time = False
-        """Whether a simulation was run in real time."""
+        self.without_real_time = False
+        """Whether real time was set where it has no effect."""
         self._elsewhere = mmap(-1, 1)  # shared memory that forked processes write to
         self._others = OtherProcesses(LIBRARIES["bullet"])
         self._of: dict[Hashable, Watch] = {}
@@ -268,9 +321,9 @@ class Watches:
             self._of[which] = _Kept(which, self._number, self.failed, name=self._name, **self._how)
         elif happening == "stepped":
             self.steps += 1
-        elif happening == "run by the clock":
-            self.in_real_time = True
-        else:
+        elif happening == "has no real time":
+            self.without_real_time = True
+        elif happening == "ended":
             self._of.pop(which, None)
 
     @property

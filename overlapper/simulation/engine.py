@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
+from contextlib import AbstractContextManager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -21,7 +22,7 @@ RETURNED = frozenset({"mujoco"})
 FILES = {".xml": "mujoco"}
 """The engine that simulates a model file directly, by the ending of the file."""
 
-Happening = Literal["began", "stepped", "ended", "run by the clock"]
+Happening = Literal["began", "stepped", "ended", "real time begins", "real time ends", "has no real time"]
 Listener = Callable[[Happening, Hashable], None]
 """Called with an event of a simulation, and with the simulation."""
 
@@ -37,6 +38,10 @@ class Simulation(Protocol):
     def time_step(self) -> float:
         """The time step, s."""
 
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+
     def build(self, build: Callable[..., Any], parameters: Mapping[str, Any]) -> Any:
         """Call the `build` of a scene with the scene's parameters, and with the simulation if `build` fills one.
 
@@ -45,6 +50,9 @@ class Simulation(Protocol):
 
     def step(self) -> None:
         """Make a time step."""
+
+    def held(self) -> AbstractContextManager[None]:
+        """Hold a simulation that runs in real time, during the block."""
 
     def leave(self) -> None:
         """Stop observing the simulation, which may go on."""

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
@@ -330,14 +331,14 @@ def test_bodies_are_named_by_the_command_and_options_of_ours_behind_the_script_a
 
 
 INTERRUPTED = """
-import os, signal, threading, time
+import os, signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
-def press():
-    while "overlapper.cli.summary" not in sys.modules:
-        time.sleep(0)
-    os.kill(os.getpid(), signal.SIGINT)
+class Press:
+    def find_spec(self, name, path=None, target=None):
+        if name == "overlapper.cli.summary":
+            os.kill(os.getpid(), signal.SIGINT)
 steps(3)
-threading.Thread(target=press, daemon=True).start()
+sys.meta_path.insert(0, Press())
 """
 
 
@@ -359,8 +360,51 @@ def test_a_script_that_never_steps_gets_a_message():
     script("p.connect(p.DIRECT); p.setRealTimeSimulation(1)")
     assert said(watch("script.py")) == (
         "overlapper: nothing was measured: script.py never called pybullet.stepSimulation or mujoco.mj_step in its own "
-        "process, and simulations in real time are not stepped by calls\n"
+        "process, and pybullet.DIRECT has no simulation in real time\n"
     )
+
+
+REAL_TIME = """
+import time
+c = p.connect(p.SHARED_MEMORY_SERVER)  # it runs in real time without a window
+build(c)
+ball = p.createCollisionShape(p.GEOM_SPHERE, radius=1, physicsClientId=c)
+for _ in range(2): p.createMultiBody(0, ball, basePosition=[9, 0, 0], physicsClientId=c)  # they overlap in every step
+p.setRealTimeSimulation(1, physicsClientId=c)
+time.sleep(0.5)
+p.setRealTimeSimulation(0, c)
+still = [p.getBasePositionAndOrientation(body, c) for body in range(p.getNumBodies(c))]
+time.sleep(0.2)
+assert still == [p.getBasePositionAndOrientation(body, c) for body in range(p.getNumBodies(c))]
+"""
+
+
+def test_a_simulation_in_real_time_is_sampled():
+    script(REAL_TIME + "for _ in range(3): p.stepSimulation(c)")
+    begin = time.monotonic()
+    done = watch("--rate", "100", "--pairs", "all", "--json", "--out", "own.csv", "script.py")
+    elapsed = time.monotonic() - begin
+    assert done.returncode == 0, done.stderr
+    (simulation,) = json.loads(said(done).splitlines()[-1])["simulations"]
+    assert 2 <= simulation["sampled"] <= 100 * elapsed
+    assert simulation["measured"] == simulation["steps"] == simulation["sampled"] + 3
+    time_of = {row["step"]: row["time_s"] for row in read_table(Path("own.csv"))}
+    times = list(time_of.values())
+    assert times == sorted(times)
+    assert times[-1] - times[-2] == pytest.approx(1 / 240)
+    assert times[-1] < elapsed
+    script(REAL_TIME + "p.disconnect(c); time.sleep(0.1)")
+    assert "samples of a simulation in real time, which was held meanwhile: at most 60 a second.\n" in said(
+        watch("script.py")
+    )
+
+
+def test_a_failed_sample_of_a_simulation_in_real_time_is_reported():
+    script("import tempfile; tempfile.tempdir = '/no/such/folder'" + REAL_TIME)
+    done = watch("--rate", "100", "script.py")
+    assert done.returncode == 2
+    assert "overlapper: script.py was watched up to step 1: " in said(done)
+    assert run(*COMMAND, "watch", "--rate", "0", "script.py").returncode == 2
 
 
 def test_a_script_without_overlaps_gets_a_message():

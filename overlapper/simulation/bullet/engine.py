@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
@@ -37,6 +37,10 @@ class Client:
     def time_step(self) -> float:
         return time_step(self._client)
 
+    @property
+    def running(self) -> bool:
+        return bool(pybullet.isConnected(self._client))
+
     def build(self, build: Callable[..., Any], parameters: Mapping[str, Any]) -> Any:
         return build(self._client, **parameters)
 
@@ -46,6 +50,14 @@ class Client:
         except pybullet.error as error:
             raise Unreadable("its client is disconnected") from error
 
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        _set_real_time(self._client, False)
+        try:
+            yield
+        finally:
+            _set_real_time(self._client, True)
+
     def leave(self) -> None:
         if self._own:
             self._own.close()
@@ -54,6 +66,10 @@ class Client:
         self.leave()
         with suppress(pybullet.error):  # the client is already disconnected
             pybullet.disconnect(self._client)
+
+
+def _set_real_time(client: int, real_time: bool) -> None:
+    calls.unheard("setRealTimeSimulation")(real_time, physicsClientId=client)
 
 
 def begin() -> Client:
@@ -70,8 +86,15 @@ def listen(listener: Listener) -> Callable[[], None]:
             listener("began", result)
         elif name in HAPPENINGS:
             listener(HAPPENINGS[name], arguments.get("physicsClientId", 0))
-        elif name == "setRealTimeSimulation" and arguments.get("enableRealTimeSimulation"):
-            listener("run by the clock", arguments.get("physicsClientId", 0))
+        elif name == "setRealTimeSimulation":
+            client = arguments.get("physicsClientId", 0)
+            if not arguments["enableRealTimeSimulation"]:
+                listener("real time ends", client)
+                _set_real_time(client, False)  # a listener may have held it when the call came, and released it since
+            elif pybullet.getConnectionInfo(client)["connectionMethod"] == pybullet.DIRECT:
+                listener("has no real time", client)
+            else:
+                listener("real time begins", client)
 
     calls.listen(hear)
     return lambda: calls.unlisten(hear)

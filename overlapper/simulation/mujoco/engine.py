@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,10 @@ class Simulated:
     def time_step(self) -> float:
         return float(self._known.model.opt.timestep) * steps_of_call()
 
+    @property
+    def running(self) -> bool:
+        return True
+
     def build(self, build: Callable[..., Any], parameters: Mapping[str, Any]) -> Any:
         model, data, *step = _parts(build(**parameters))
         mujoco.mj_forward(model, data)
@@ -38,6 +43,9 @@ class Simulated:
 
     def step(self) -> None:
         mujoco.mj_step(self._known.model, self._known)
+
+    def held(self) -> AbstractContextManager[None]:
+        return nullcontext()  # only calls make steps
 
     def leave(self) -> None:
         return
