@@ -39,7 +39,7 @@ CALLS: dict[tuple[Any, str], str] = {
     (Bodies, "update"): "poses",
     (Bodies, "follow"): "poses",
     (BulletDynamics, "frames"): "poses",
-    (VolumetricContact, "_coming"): "what comes",
+    (VolumetricContact, "_coming"): "coming pairs",
     (Bodies, "overlaps"): "overlaps",
     (_core.ContactSolver, "place"): "patches",
     (BulletDynamics, "velocity"): "velocities",

@@ -64,28 +64,28 @@ def physics_table(of: Figures) -> str:
         ["the same, 32 substeps", "0", *most("bounce", "edge", "32", "")],
         ["bounce on a corner, 16 substeps", "0", f"{small(of['bounce', 'volumetric', 'corner']['16'])}", ""],
         [
-            "speed after a bounce, of that before, *τ* = 0.5 ms",
+            "speed after a bounce, over the speed before, *τ* = 0.5 ms",
             f"{of['rebound', 'volumetric', 'foretold']['0.0005']:.3f}",
             f"{of['rebound', 'volumetric', 'measured']['0.0005']:.3f}",
             "no *τ*",
         ],
-        ["way until a box stops, over *v²/2µg*, 1 substep", "1", *both("slide", "", "1")],
+        ["distance until a box stops, over *v²/2µg*, 1 substep", "1", *both("slide", "", "1")],
         ["the same, 20 substeps", "1", *both("slide", "", "20")],
-        ["way in 1 s on an incline of 0.999 *µ*", "0", *most("incline", "way", "0.999", " m")],
+        ["distance in 1 s on an incline of slope 0.999 *µ*", "0", *most("incline", "way", "0.999", " m")],
         [
-            "acceleration there, at 1.001 *µ*, over *g*", f"{expected_incline(1.001):.2e}",
+            "acceleration on an incline of slope 1.001 *µ*, over *g*", f"{expected_incline(1.001):.2e}",
             *(f"{of['incline', law, 'acceleration']['1.001']:.2e}" for law in LAWS),
         ],
         ["time of a spinning box, over *Iω/µmgρ*, 4 substeps", "1", *both("spin", "box", "4")],
         ["time of a spinning disc, 4 substeps", "1", *both("spin", "disc", "4")],
         [
-            "slip and spin at once, way over that of a rigid base", "1",
+            "slip and spin at once, distance over that of a rigid base", "1",
             f"{ratio('slide and spin', 'volumetric', 'box ellipsoid', 'way')}, distributed "
             f"{ratio('slide and spin', 'volumetric', 'box distributed', 'way')}",
             ratio("slide and spin", "bullet", "box", "way"),
         ],
         ["kinetic energy that a rolling cylinder loses in 1 s, *τ* = 0", "0", *most("roll", "cylinder", "energy", "")],
-        ["that of a rolling ball", "0", *most("roll", "ball", "energy", "")],
+        ["the same for a rolling ball", "0", *most("roll", "ball", "energy", "")],
         [
             "decay of a rolling cylinder, over ⅔ *τg/r*, *τ* = 1 ms", "1",
             f"{-math.log(of['roll', 'volumetric', 'cylinder']['0.001']) / (2 / 3 * 1e-3 * 9.81 / 0.05):.4f}", "no *τ*",
@@ -98,7 +98,7 @@ def physics_table(of: Figures) -> str:
         ["SimBenchmark: speed of the 25 balls on it", "1", *both("push", "balls", "45")],
         ["a box gripped by 1.01 *mg/2F*: its speed", "0", *most("grip", "speed", "1.01", " m/s")],
         [
-            "gripped by 0.99 *mg/2F*: acceleration, over *g*", "0.0100",
+            "a box gripped by 0.99 *mg/2F*: its acceleration, over *g*", "0.0100",
             *(f"{of['grip', law, 'acceleration']['0.99']:.4f}" for law in LAWS),
         ],
         [
@@ -184,10 +184,10 @@ def cost_table(path: Path) -> str:
     )
     pile = found[PILE]
     told = (
-        f"The {PILE}, {pile['contacts']:,.0f} contacts, at 240 Hz: a step in {pile['substeps']:.0f} substeps takes "
-        f"{pile['step'] / 1e3:.1f} ms, Bullet's own step of the same pile {pile['bullet'] / 1e3:.1f} ms: "
-        f"**{pile['step'] / pile['bullet']:.1f} times** as long. Its boxes of 1 kg are {pile['deepest'] * 1e3:.0f} mm "
-        f"deep in each other at the most, where corners meet."
+        f"The {PILE} has {pile['contacts']:,.0f} contacts, at 240 Hz. A step in {pile['substeps']:.0f} substeps takes "
+        f"{pile['step'] / 1e3:.1f} ms. Bullet's own step of the same pile takes {pile['bullet'] / 1e3:.1f} ms. "
+        f"Volumetric contact takes **{pile['step'] / pile['bullet']:.1f} times** as long as Bullet. The boxes of 1 kg "
+        f"are at most {pile['deepest'] * 1e3:.0f} mm deep in each other, where corners meet."
     )
     return f"{said}\n\n{fill(told, 130)}\n\n    {note}"
 

@@ -37,7 +37,7 @@ def test_the_parts_of_a_substep_are_timed_and_nothing_else_remains_of_it(tmp_pat
     page = (tmp_path / "forces.md").read_text(encoding="utf-8")
     assert f"| {' | '.join([*cost.SCENES, cost.PILE])} |" in page
     assert all(f"| {part} |" in page for part in [*cost.PARTS, "else", "**all**"])
-    assert "The pile of 200 boxes, 10 contacts, at 240 Hz" in page
+    assert "The pile of 200 boxes has 10 contacts, at 240 Hz" in page
 
 
 def test_what_is_called_within_counts_for_its_own_part():
