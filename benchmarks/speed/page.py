@@ -196,7 +196,6 @@ def growth_panel(shown: Growth, decades: dict[float, str]) -> Panel:
 def text(found: Results) -> str:
     rows = found.rows
     pairs = {row.family: int(row.pairs) for row in rows if row.method == "auto"}
-    depths = ((family, find(rows, family, "auto, depth")) for family in COMPARED)
     cores = re.search(r"(\d+) cores", " ".join(found.notes))
     return filled(
         Path(__file__).with_name("page.md"),
@@ -206,7 +205,6 @@ def text(found: Results) -> str:
         compared=compared(rows),
         wrong=wrong(rows),
         warm=warm(rows),
-        depths=", ".join(f"{family} {duration(float(row.us))}" for family, row in depths if row),
         results=found.folder,
         notes=indented(found.notes),
     )
@@ -223,8 +221,9 @@ def compared(rows: list[Row]) -> str:
         cells = [family, duration(float(peer.us)), duration(float(clock.us)) if clock else ""]
         for ours in (alone, many):
             cells += [duration(float(ours.us)), times(float(peer.us) / float(ours.us))] if ours else ["", ""]
-        lines.append(cells)
-    heading = ["", "manifold3d", "by the clock", "a call", "times faster", "a pair of a batch", "times faster"]
+        depth = find(rows, family, "auto, depth")
+        lines.append([*cells, duration(float(depth.us)) if depth else ""])
+    heading = ["", "manifold3d", "by the clock", "a call", "times faster", "a pair of a batch", "times faster", "depth"]
     return table(heading, lines)
 
 
@@ -235,18 +234,18 @@ def warm(rows: list[Row]) -> str:
         if cold and again:
             us = float(cold.us), float(again.us)
             lines.append([family, *map(duration, us), f"{us[0] / us[1]:.2f}"])
-    return table(["", "first call", "the next, a little moved", "times faster"], lines)
+    return table(["", "first call", "second call, 0.1 mm moved", "times faster"], lines)
 
 
 def wrong(rows: list[Row]) -> str:
-    """The peers that answered beside the truth at a setting that promises exact answers."""
+    """The methods that are off by more than `WRONG` at a setting that promises exact answers."""
     off: dict[str, list[Row]] = {}
     for row in rows:
         exact = row.facets and (row.method not in PEERS["volume"] or PEERS["volume"][row.method].exact)
         if row.error and exact and float(row.error) > WRONG:
             off.setdefault(" ".join(filter(None, (row.method, row.setting))), []).append(row)
     if not off:
-        return "Among the polyhedra, nobody is off by more than 1e-6."
+        return "No method is off by more than 1e-6 on polyhedra."
     lines = []
     for name, found in sorted(off.items(), key=lambda item: -max(float(row.error) for row in item[1])):
         worst = sorted(found, key=lambda row: -float(row.error))
