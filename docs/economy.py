@@ -1,4 +1,4 @@
-"""Writes docs/economy.md: how little of each scene is looked at, and in what time.
+"""Writes docs/economy.md: the pairs and facets that are examined in each scene, and the time.
 
 python docs/economy.py
 """
@@ -26,29 +26,33 @@ HERE = Path(__file__).resolve().parent
 
 WORDS = """\
 <!-- Written by docs/economy.py. -->
-# Choosing shapes: time of balls, boxes and hulls
+# Benchmarks: work and time per scene
 
-What `update()` and `overlaps()` look at in a step of each scene of [`scenes/`](../scenes), on average over all of its
-steps, and for how long.
+This page counts the pairs and facets that `update()` and `overlaps()` examine in a step of each scene of
+[`scenes/`](../scenes). The counts are averages over all steps.
 
 {table}
 
-- **shapes**: those of the scene, and of these the modelled ones if some are not. They are read once.
-- **pairs possible**: pairs of shapes that the simulator lets collide; **examined**: those whose boxes meet;
-  **overlapping**: those that share volume.
-- **facets there**: of the boxes, hulls and half-spaces of all examined pairs, which a method would work through that
-  takes the shapes as wholes; round shapes have none. **Asked**: planes that were placed to be held against corners, or
-  that a shape gave as an answer to where a ray leaves it or which plane is tightest about a point; a pair that has not
-  moved asks for none. **Touched**: planes that took part in building what is common. Tangent planes of round shapes
-  count among both.
-- **again**: overlaps that had to be measured again in wider arithmetic, being so thin that doubles would not place
-  their volume to 1e-12 of itself.
-- **time**: of `update()` and `overlaps()` at the default tolerance, the median step, on one thread{machine}.
+- **shapes**: the shapes of the scene. They are read once. If some are not modelled, the number of modelled shapes
+  follows.
+- **pairs possible**: the pairs of shapes that the simulator lets collide.
+- **examined**: the pairs whose bounding boxes overlap.
+- **overlapping**: the pairs with a common volume.
+- **facets there**: the number of all facets of the boxes, hulls and half-spaces of all examined pairs. Round shapes
+  have none.
+- **asked**: the planes that were placed and compared with corners, and the planes that a shape returned for a ray or
+  a point. A pair that has not moved asks for none.
+- **touched**: the planes that took part in the computation of the common part. Tangent planes of round shapes count,
+  too.
+- **again**: the overlaps that were measured again in wider arithmetic. They are so thin that the error in doubles is
+  more than 1e-12 of their volume.
+- **time**: the processor time of `update()` and `overlaps()` at the default tolerance, the median step, on one
+  thread{machine}.
 
-## By which way
+## Methods per scene
 
-Pairs that overlap or touch in a step, on average over all steps, by the
-[way](how.md#which-method-measures-which-bodies) in which the answer came.
+This table has the number of pairs that overlap or touch in a step, by the
+[method](how.md#which-method-measures-which-bodies) that measured them. The numbers are averages over all steps.
 
 {ways}
 
