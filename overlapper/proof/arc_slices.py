@@ -224,20 +224,21 @@ class Slicing:
 
 
 def beyond(t: arb, f: arb, growth: arb) -> arb:
-    """The volume beyond the last slice, where the square root of the area falls at least as fast as before."""
+    """Bounds of the volume beyond the last slice. The square root of the area falls there no slower than before."""
     if not growth < 0:
         raise Refused
     return arb(0).union(-(f**3) / (3 * growth))
 
 
 def between(t: arb, f: arb, rate: arb, u: arb, g: arb, growth: arb) -> arb:
-    """The volume between slices t < u. The square roots of their areas are f and g.
+    """Bounds of the volume between the slices at t < u, whose areas are f² and g².
 
-    The square root grows by at most `rate` at t, and by at most `growth` backwards at u.
+    The square root of the area is concave. It is above the chord from f to g. It is below two lines: a line from f with
+    the slope `rate`, and a line from g that rises by `growth` towards t.
     """
     length = u - t
     least = length * (f * f + f * g + g * g) / 3
-    # The lines from both ends meet at this share of the length.
+    # The two lines meet at this share of the length.
     share = float(((g + growth * length - f) / (length * (rate + growth))).mid())
     share = min(max(share, 0.0), 1.0) if share == share else 0.5
     greatest = arb(0)

@@ -1,7 +1,8 @@
-"""The volume that a ball, a cylinder and a polytope share. A slice is a disc between two lines, cut by other lines.
+"""The common volume of a ball, a cylinder and a polytope, by slices along the cylinder's axis.
 
-A line that cuts the disc removes a segment. The integral of a segment is elementary for a line of the polytope, but not
-for a line of the cylinder.
+In a slice, the ball is a disc, the cylinder is a strip between two lines, and each facet is a line. A line that cuts
+the disc removes a circular segment. The integral of the segment's area over all slices is elementary for a line of the
+polytope, but not for a line of the cylinder.
 """
 
 from __future__ import annotations
@@ -166,7 +167,7 @@ class BallAndTube(Slices):
             by_disc = is_positive(-reach - here), is_positive(there - reach)
             kept.append((line, None if by_disc[0] else before, None if by_disc[1] else after))
         if not kept:
-            # More bits do not decide the side of a line through the centre. It is in the disc unless others cut it off.
+            # No precision decides the side of a line through the centre. It is in the disc unless others cut it off.
             if any(offsets[line] < 0 for line, _ in around):
                 return None
             assert all(is_positive(offsets[line]) for line, _ in around)
@@ -196,7 +197,7 @@ class BallAndTube(Slices):
         return arb.atan2(y * root(self.qq), x * root(self.pp))
 
     def _turn(self, line: int, following: int, offsets: list[arb], disc: arb) -> arb:
-        """The angle from the normal of a line to the next line's normal after an arc, with all turns of the arc."""
+        """The angle from the normal of `line` to the normal of `following`, the line after an arc, with all turns."""
         turn = self._direction(following) - self._direction(line) if following != line else arb(0)
         arc = turn
         for k in (line, following):
@@ -210,7 +211,10 @@ class BallAndTube(Slices):
     # Integrals
 
     def form(self, line: int, other: int) -> Form:
-        """Twice the area of the triangle of the origin, the foot on a line, and the line's point on another line."""
+        """Twice the area of a triangle, as a form over the slices.
+
+        Its corners are the origin, the foot of the origin on `line`, and the point where `line` meets `other`.
+        """
         key = (line, other)
         if key not in self._forms:
             p, q = self.corner(line, other)
@@ -250,7 +254,7 @@ class BallAndTube(Slices):
         through_pole = offset[0] * offset[0] == offset[1] * offset[1] * self.tt * self.thick
         for side, pole in ((-1, radius), (1, -radius)):
             if through_pole and side * offset[0] * offset[1] >= 0:
-                continue  # the slack and the share of the pole are zero, but balls may not show it
+                continue  # the slack and the term of the pole are zero, but ball arithmetic may not show it
             slack = d0 + d1 * pole
             slope = -2 * pole - 2 * slack * d1
             turns = [
@@ -261,12 +265,15 @@ class BallAndTube(Slices):
         return total
 
     def _strip_segment(self, line: int, low: arb, high: arb, goal: int) -> arb:
-        """The same integral with d = ±level + ρ₁, in the angle in which the thinner of both is a cosine."""
+        """The integral of `_plane_segment` with d = ±level + ρ₁.
+
+        The variable is an angle. Its cosine is proportional to the smaller half width, of the disc or of the strip.
+        """
         side = 1 if line == 0 else -1
         away = arb(side * self.level) / root(self.pp)
         thin, thick = arb(self.thin), arb(self.thick)
         radius = root(self.thin)
-        # The value at t = 0. Elsewhere, the loss is written without a difference: a ball would not show its sign.
+        # The value at t = 0. The loss at other t is no difference: ball arithmetic might not decide its sign.
         rest = thick - thin - away * away - 2 * away * radius
         tube_is_thin = self.thin <= self.thick
         least = root(min(self.thin, self.thick))
@@ -292,7 +299,7 @@ class BallAndTube(Slices):
                 turn = pi + turned * ((other - height) / disc).log(analytic=analytic)
             found = (disc * disc * turn - height * reach) * short
             if not analytic and not found.is_finite():
-                # Near a pole of the ball the angle has no bounds: the area is between 0 and that of the disc.
+                # Near a pole of the ball, the angle has no bounds. The area is between 0 and the area of the disc.
                 return acb((pi * disc * disc * short).real.union(arb(0)))
             return found
 

@@ -23,7 +23,8 @@ Matrix = tuple[Vector, Vector, Vector]
 HALF = fmpq(1, 2)
 UNIT: Matrix = (vector([1, 0, 0]), vector([0, 1, 0]), vector([0, 0, 1]))
 
-# The most frames, each about the centre found in the frame before; and the most steps of Newton's method in a frame.
+# The largest number of frames, and of steps of Newton's method in a frame. Each frame is about the centre found in the
+# frame before.
 FRAMES, STEPS = 40, 60
 # The least second derivative that is trusted, as a share of the greatest.
 FLAT = 1e-13
@@ -147,9 +148,12 @@ class Barrier:
         return y, hessian
 
     def inside(self, y: Floats, radius: float) -> tuple[Floats, Floats, Floats | None]:
-        """From any point: a point inside, second derivatives, and None; or weights of constraints that exclude a point.
+        """A point inside all constraints, the second derivatives of the barrier there, and None.
 
-        A barrier in four variables, in a ball about the start, gives a path along which the greatest value falls.
+        The search starts at any point `y`. If it finds no point inside, the last value has weights of the constraints.
+        `excluded` then bounds the volume by their weighted sum. The barrier has four variables: the point, and a level
+        above the values of all constraints. The level falls from step to step. The point stays within 2 `radius` of the
+        start.
         """
         scale = np.sqrt((self.linear**2).sum(axis=1)) + np.abs(self.forms).max(axis=(1, 2)) + 1e-300
         start, level = y.copy(), float((self.at(y)[0] / scale).max()) + 1.0
@@ -203,7 +207,7 @@ GENERIC = np.linalg.qr(np.array([[0.5377, 0.8622, -0.4336], [1.8339, 0.3188, 0.3
 
 
 def framed(constraints: list[Constraint], around: Floats) -> RoundFrame | arb:
-    """The frame in which the common part is round; or bounds of its volume, if no point inside all was found."""
+    """The frame in which the common part is round, or bounds of its volume if no point inside all was found."""
     middle, half = around.mean(axis=0), np.ptp(around, axis=0) / 2
     origin, size = vector(middle.tolist()), float(half.max())
     columns = exact_columns(np.eye(3) * size)

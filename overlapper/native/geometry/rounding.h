@@ -31,7 +31,8 @@ inline double rounding(double magnitude) { return 16 * 0x1p-53 * magnitude; }
 /// much, including the last bits of each quaternion's length. Below this, wider arithmetic decides.
 inline double doubt(double magnitude) { return 4 * rounding(magnitude); }
 
-/// m: error of a plane or a point of a placed body in double-doubles, for numbers that add up to `magnitude`.
+/// m: error of a plane or a point of a placed body in double-doubles. `magnitude`, in m, is the sum of the sizes of all
+/// numbers that are added. A body is `turned` if its rotation is not the identity.
 ///
 /// With u = 2^-106, an addition loses 3 u of its result, a product 5 u, a quotient 10 u, the length of a vector 10 u
 /// (Joldes, Muller and Popescu 2017). The distance of a point p from a plane therefore loses 35 u |p|. A rotation adds

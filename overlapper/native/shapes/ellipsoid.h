@@ -51,8 +51,8 @@ Examples
   Plane tightest(Vec3 point) const;
   /// The supporting plane whose normal is along `outward`.
   Plane supporting(Vec3 outward) const;
-  /// The unit normals at the local minima of the distance of the surface from the point. There are one or two: at the
-  /// nearest point, and across the shortest axis.
+  /// The outward unit normals where the distance between the point and the surface has a local minimum. The first is at
+  /// the nearest point. A second minimum may lie across the shortest axis.
   std::vector<Vec3> ways_out(Vec3 point) const;
 
   CoreKind core_kind() const { return ball() ? CoreKind::kPolytope : CoreKind::kCurved; }

@@ -19,7 +19,7 @@ constexpr double kUnit = 0x1p-53;  ///< of rounding
 /// Relative error of a length: 4 roundings for a unit vector, one for a difference, 3 for their product. Relative to
 /// the size of the numbers.
 constexpr double kPlacing = 8 * kUnit;
-constexpr double kOpen = 1e-9;  ///< relative to the squared radius: errors of areas are smaller unless a turn is wrong
+constexpr double kOpen = 1e-9;  ///< over the squared radius: a larger error of an area means a wrong turn
 
 /// A sum that is rounded only once.
 class SumRoundedOnce {
@@ -37,7 +37,7 @@ class SumRoundedOnce {
 };
 
 /// The disc that a face's plane cuts from the ball, with sums over the face's part of the disc, edge by edge. Seen from
-/// the middle, that part consists of triangles, and of sectors for the remaining angles.
+/// the middle, this part consists of a triangle for each edge, and of sectors for the remaining angles.
 struct Disc {
   double height = 0;     ///< of the plane over the centre
   double square = 0;     ///< of the radius ρ; 0 if the plane does not reach the ball
@@ -66,8 +66,8 @@ struct DiscChord {
   double distance2(double t) const { return height * height + t * t; }
 };
 
-/// Removes the sector between two unit vectors from a disc. The directions of its arc sum to the opposite of those of
-/// the edges.
+/// Subtracts the first and third moments of a sector from a disc. `out` is minus the integral of the unit vectors over
+/// the angle of the sector.
 void add_sector(Vec3 out, Disc& disc) {
   const double cube = disc.square * std::sqrt(disc.square);
   disc.first += cube / 3 * out;
@@ -138,7 +138,8 @@ struct BallSums {
   double pressure = 0;  ///< Σ h ∫ (|x|² − r²) dA
 };
 
-/// An edge, seen along itself: both planes and the line where they meet, from the heights of one plane and of the line.
+/// An edge, projected along itself: both planes and the line where they meet. The height of one plane and the height of
+/// the line give the height of the other plane.
 struct SeenEdge {
   Vec3 n, m, along, out;
   double length, cosine, sine;
@@ -195,8 +196,8 @@ void add_short_edge(const Edge& edge, const BallAndPolyhedron& at, BallSums& sum
   ++sums.characteristic;
 }
 
-/// The ends of an edge's part inside, along the edge. No value if there is no such part. An edge along the sphere may
-/// seem to end on the sphere beyond a corner; the corner then counts.
+/// The ends of an edge's part inside, along the edge. No value if there is no such part. If rounding puts an end beyond
+/// a corner, as on edges nearly tangent to the sphere, the corner is the end.
 std::optional<std::array<double, 2>> range_inside(const SeenEdge& edge, bool from_inside, bool to_inside,
                                                   const Disc& left, const Disc& right) {
   const double half = std::sqrt(std::max(0.0, left.square - edge.height * edge.height));
@@ -243,7 +244,7 @@ void add_corner_at_centre(Vec3 n, Disc& disc) {
 /// Adds the part of a face inside the ball, and returns it.
 Section add_face(const Disc& disc, Vec3 n, bool is_cut, double r, BallSums& sums) {
   BallPart& part = sums.part;
-  // A face that is only rounding may seem to surround any point.
+  // A face as small as rounding may seem to surround any point.
   const bool wide_enough = disc.touched || disc.whole >= 6 * disc.square;
   const bool whole_turn = disc.around && disc.square > 0 && wide_enough;
   if (!whole_turn && !disc.touched) return {};
@@ -277,11 +278,11 @@ void finish(const std::vector<Disc>& discs, double r, BallSums& sums) {
   const double r2 = r * r, r3 = r * r2;
   sums.curved += DoubleDouble{sums.characteristic * 2.0} * kWidePi;
   const double area = r2 * sums.curved.value();
-  // If no face reaches the ball, no plane does either, unless the polyhedron is only rounding.
+  // If no face reaches the ball, no plane does either, unless the polyhedron is as small as rounding.
   const bool reached = std::ranges::any_of(discs, [](const Disc& disc) { return disc.square > 0; });
   if (part.faces == 0 && reached) part.error = kInfinity;
   // The rest of the sphere, beyond the faces, is larger than the faces. The area of the curved part is larger than the
-  // length of its area vector. A wrong turn would violate one of the two.
+  // length of its area vector. A wrong turn would violate one of these two inequalities.
   const double slack = kOpen * r2;
   if (!(area + sums.flats <= 4 * kPi * r2 + slack && norm(part.flat) <= area + slack)) part.error = kInfinity;
   part.area += area;
@@ -306,20 +307,23 @@ void finish(const std::vector<Disc>& discs, double r, BallSums& sums) {
 //
 // All sums share the same decisions. Whether a corner is inside, which part of an edge is inside, and on which side of
 // an edge a disc's middle lies are each decided once. If rounding makes a decision wrong, it is right for a ball or a
-// plane that is moved by the rounding. Tangent planes and grazed edges therefore need no special care.
+// plane that is moved by the rounding. Tangent planes and tangent edges are therefore no special cases.
 //
 // If the ball's centre is itself a corner, the sums treat the corner as if it were a little farther along the edge that
 // leaves it. The middles of its faces' discs are then outside.
 //
 // Error. Every term has at most ten roundings. Sums of many terms are rounded once, because the turns of a fine
-// polyhedron cancel in all but their last digits. Rounding misplaces an edge by kPlacing times the reach of its
-// numbers, plus the misplacement of these numbers. Seen along the edge, the two planes and their line still meet. The
-// edge adds to the volume a signed part of the ball, between its planes and two radii of its discs. This part changes
-// by at most the parts of the discs that the edge cuts off, and each of these is part of a sector. If the edge ends in
-// a corner inside, a disc's middle sees the corner in a direction that is off. The error is the misplacement of the
-// corner over its distance. It changes a sector, and the part of the ball above the sector. If a corner is in the
-// middle of a disc, there is no bound, and edges disagree about this direction. If the edge ends on the sphere, the
-// turn there assumes planes parallel to the edge; the measured deviation counts as error.
+// polyhedron cancel in all but their last digits. The other errors come from the edges:
+//
+// - Rounding misplaces an edge by kPlacing times the size of its numbers, plus the misplacement of these numbers. Seen
+//   along the edge, the two planes and their line still meet. The edge contributes to the volume a signed part of the
+//   ball, between its planes and two radii of its discs. The error of this part is at most the misplacement times the
+//   area that the edge cuts off from the discs. This area is part of a sector of each disc.
+// - If the edge ends in a corner inside, the direction from a disc's middle to the corner has an error: the
+//   misplacement of the corner over its distance. It changes a sector, and the part of the ball above the sector. If
+//   the corner is in the middle of the disc, the error has no bound, because each edge gives another direction.
+// - If the edge ends on the sphere, the formula of the turn assumes planes parallel to the edge. The measured deviation
+//   counts as error.
 std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius) {
   thread_local std::vector<Disc> discs;
   thread_local std::vector<char> inside;

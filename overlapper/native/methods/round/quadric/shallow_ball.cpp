@@ -15,8 +15,11 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kUnit = 0x1p-53;  ///< of rounding
-constexpr double kOneWay = 1e-7;   ///< relative to the distances of two ends: if nearer, doubles give no direction
-constexpr double kNear = 1e-9;     ///< of squares: nearer to the sphere, doubles leave the side of a corner uncertain
+/// Two ends: their distance over the sum of their distances from the apex. Below this, doubles give no direction.
+constexpr double kOneWay = 1e-7;
+/// Squared distance from the sphere, relative to the squared radius. Below this, doubles do not decide on which side of
+/// the sphere a corner is.
+constexpr double kNear = 1e-9;
 
 /// y z, z x and x y, with one factor from each point.
 Vec3 products(Vec3 a, Vec3 b) { return {a.y * b.z, a.z * b.x, a.x * b.y}; }
@@ -24,7 +27,7 @@ Vec3 products(Vec3 a, Vec3 b) { return {a.y * b.z, a.z * b.x, a.x * b.y}; }
 }  // namespace
 
 // The faces have heights h over the apex and areas A. The apex has the depth d in the ball of radius r. A normal n of
-// the unit sphere has the height 1 − w, so w is the lost height.
+// the unit sphere has the height 1 − w: w is the height that it loses from the top.
 //
 //   3 V = Σ h A + r² (d S + (r − d) L),   S = ∫ dA = ∮ w dφ,   L = ∫ w dA = ½ ∮ w² dφ,   ∫ w² dA = ⅓ ∮ w³ dφ
 //
@@ -36,8 +39,7 @@ Vec3 products(Vec3 a, Vec3 b) { return {a.y * b.z, a.z * b.x, a.x * b.y}; }
 //   ∫ x wᵏ dA = ∮ wᵏ⁺¹ dy / (k + 1),   ∫ y wᵏ dA = −∮ wᵏ⁺¹ dx / (k + 1),   ∫ xy wᵏ dA = ∮ y wᵏ⁺¹ dy / (k + 1),
 //   ∫ (x² wᵏ + (1 − w) wᵏ⁺¹ / (k + 1)) dA = ∮ x wᵏ⁺¹ dy / (k + 1), and so for y.
 //
-// No term is larger than the common set, unless the curved part does not contain the direction of the apex. Nothing
-// cancels.
+// If the curved part contains the direction of the apex, no term is larger than the common set, and nothing cancels.
 //
 // The points of an arc are rational functions of the tangent of a quarter of its angle. Arcs are cut so that this
 // tangent is at most that of 22.5°. The nearest pole is at 2.4 times this tangent. The relative error of Gauss's
@@ -104,8 +106,8 @@ void ShallowBall::add_arc(Vec3 from, Vec3 to, Vec3 back) {
 void ShallowBall::integrate(Vec3 middle, Vec3 along, Vec3 out, double quarter) {
   const double scale = 1 / radius_, q2 = quarter * quarter;
   const double mx = scale * middle.x, my = scale * middle.y;
-  // From the middle, a point of the arc is 2 τ / (1 + τ²) over 2 q / (1 + q²) times `along`, and 2 (q² − τ²) / ((1 +
-  // τ²) (1 + q²)) times `out`.
+  // A point of the arc is middle + a along + b out, with a = (2 τ / (1 + τ²)) / (2 q / (1 + q²)) and
+  // b = 2 (q² − τ²) / ((1 + τ²) (1 + q²)).
   const double widen = scale * (1 + q2), ax = widen * along.x, ay = widen * along.y;
   const double rise = 2 * scale * q2 / (1 + q2), bx = rise * out.x, by = rise * out.y;
   const double size = rise * std::sqrt(norm2(out));
@@ -113,7 +115,7 @@ void ShallowBall::integrate(Vec3 middle, Vec3 along, Vec3 out, double quarter) {
     for (const double node : {-kGaussNode[i], kGaussNode[i]}) {
       const double t2 = q2 * node * node, c = 1 / (1 + t2);
       const double go = node * c, bulge = (1 - node * node) * c;
-      // Backwards: a face is on the left of its border, and the curved part is on the right.
+      // The rates have the opposite sign: a face is on the left of its border, and the curved part is on the right.
       const double go_rate = -kGaussWeight[i] * (1 - t2) * c * c,
                    bulge_rate = 2 * kGaussWeight[i] * (1 + q2) * node * c * c;
       const double x = mx + ax * go + bx * bulge, y = my + ay * go + by * bulge;
@@ -259,7 +261,7 @@ struct WidePolyhedron {
 /// The point of a line that is nearest to the origin.
 WideVector foot_on(const WideVector& from, const WideVector& along) { return from - dot(from, along) * along; }
 
-/// The apex, relative to the centre of the ball. No value if corners miss the plane of the highest face.
+/// The apex, relative to the centre of the ball. No value if the corners of the highest face miss its plane.
 std::optional<WideVector> apex_of(const WidePolyhedron& at, const NearestPoint& nearest, int highest) {
   if (nearest.above) {
     const auto top = at.places.plane(highest);
