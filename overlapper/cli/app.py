@@ -1,4 +1,4 @@
-"""The command line: scripts watched; scenes run, seen, listed, checked, compared; robots, shapes, polytopes."""
+"""The command line `overlapper` with all of its commands."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ app = typer.Typer(
 
 
 def main() -> NoReturn:
-    """The entry point: what the user can mend ends as one sentence on stderr, with exit code 2."""
+    """The entry point. An error that the user can correct is one sentence on stderr, with exit code 2."""
     # UsageError, which is click's or typer's own, as the version of typer has it.
     usage_error: Any = typer.BadParameter.__bases__[0]
     try:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def audit_folder(
     folder: Path, units: str, least_depth: float, modelling: Modelling, out: Path | None, as_json: bool
 ) -> NoReturn:
-    """Tell of every asset, also in a table `out`; exit code 1 if anything is wrong with one."""
+    """Report every asset, also in a table `out`. The exit code is 1 if anything is wrong with an asset."""
     told = {"units": units, "least_depth": least_depth, **settings_of(modelling)}
     with input_refusals(), quiet():
         from overlapper.audit.assets import asset_files, read_asset, write_table

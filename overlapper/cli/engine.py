@@ -1,4 +1,4 @@
-"""Who does what can be done piece by piece: processes of this machine, or a Ray cluster."""
+"""The options that choose where tasks run: in processes of this machine, or on a Ray cluster."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ WorkersOption = Annotated[
 def working(
     workers: WorkersOption = None, engine: EngineOption = "processes", address: AddressOption = None
 ) -> AbstractContextManager[Executor]:
-    """The executor, for a block. To enter raises NotStarted if there is no cluster, ImportError without Ray."""
+    """The executor, for a `with`. Entering it raises NotStarted if there is no cluster, ImportError without Ray."""
     if address and engine != "ray":
         raise Refused("--address needs --engine ray")
     return _engine(engine, address, workers)

@@ -23,7 +23,7 @@ def volume_unit(largest: float) -> str:
 
 
 def show(what: Table | str, stderr: bool = False, markup: bool = True) -> None:
-    """Print it as wide as the terminal is; elsewhere, there is room for any of the tables."""
+    """Print it at the width of the terminal. In files and pipes, it is wide enough for any of the tables."""
     is_terminal = (sys.stderr if stderr else sys.stdout).isatty()
     Console(stderr=stderr, width=None if is_terminal else 140, highlight=False).print(what, markup=markup)
 

@@ -85,7 +85,7 @@ def intersect(
 
 
 def _hulls(source: str, query: str | None) -> Iterator[Hull]:
-    """The polytopes of one argument; what has been taken for them that is more than they are is named on stderr."""
+    """The polytopes of one argument. Meshes that are not convex become their hulls, with a warning on stderr."""
     if "://" in source:
         from overlapper.polytopes.database import read_polytopes
 

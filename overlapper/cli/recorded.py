@@ -1,4 +1,4 @@
-"""Steps as they come, counted on the terminal."""
+"""A count of the steps of a run, on the terminal."""
 
 from __future__ import annotations
 

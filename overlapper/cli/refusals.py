@@ -1,4 +1,4 @@
-"""Errors that the user can mend, told in one sentence on stderr. Stdout is kept for the answer."""
+"""Errors that the user can correct, as one sentence on stderr. Stdout is kept for the answer."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Interrupted(Exception):
 
 
 def say(line: str, file: TextIO | None = None) -> None:
-    """Print a line, on stdout if not on `file`; what in it would command a terminal is spelled out."""
+    """Print a line to `file`, by default stdout. Control characters of terminals are spelled out."""
     print(printable(line), file=file or sys.stdout, flush=True)
 
 
@@ -41,7 +41,7 @@ def give_up(sentence: str) -> NoReturn:
 
 @contextmanager
 def input_refusals() -> Iterator[None]:
-    """Turns what is wrong with files and databases into one sentence, and Ctrl-C into Interrupted."""
+    """Turns errors of files and databases into one sentence, and Ctrl-C into Interrupted."""
     try:
         yield
     except KeyboardInterrupt as error:
@@ -59,7 +59,7 @@ def input_refusals() -> Iterator[None]:
 
 @contextmanager
 def scene_refusals(noise: BinaryIO) -> Iterator[None]:
-    """Turns what the user can mend into one sentence, to which the last line that C has printed may add the cause."""
+    """Turns errors that the user can correct into one sentence. The last line that C has printed may add the cause."""
     try:
         yield
     except KeyboardInterrupt as error:
@@ -77,7 +77,7 @@ def scene_refusals(noise: BinaryIO) -> Iterator[None]:
 
 @contextmanager
 def quiet() -> Iterator[BinaryIO]:
-    """Keeps stdout for the answer: what Python prints goes to stderr, what C prints (as pybullet) to the file given."""
+    """Keeps stdout for the answer. Output of Python goes to stderr, output of C (as pybullet) to the yielded file."""
     with tempfile.TemporaryFile() as noise, redirect_stdout(sys.stderr), warnings.catch_warnings(), diverted(1, noise):
         warnings.simplefilter("ignore", UserWarning)  # of shapes left out: the summary names them
         _tell_some_warnings()
@@ -85,7 +85,7 @@ def quiet() -> Iterator[BinaryIO]:
 
 
 def _tell_some_warnings() -> None:
-    """Write the warnings of volumetric contact, and of names of no bodies, to stderr, a sentence each."""
+    """Write warnings of volumetric contact, and of names without a body, to stderr, a sentence each."""
     told, others = (NoDirectionWarning, SubstepsWarning, UnknownBodyWarning), warnings.showwarning
     for category in told:
         warnings.simplefilter("always", category)
@@ -108,7 +108,7 @@ def _tell_some_warnings() -> None:
 
 @contextmanager
 def diverted(descriptor: int, file: BinaryIO) -> Iterator[None]:
-    """Whatever goes to a file descriptor goes to `file` meanwhile, whoever writes it."""
+    """Redirects all output to a file descriptor to `file`, within the block."""
     kept = os.dup(descriptor)
     os.dup2(file.fileno(), descriptor)
     try:
@@ -120,10 +120,10 @@ def diverted(descriptor: int, file: BinaryIO) -> Iterator[None]:
 
 
 def import_engine(scene: str | Path) -> None:
-    """Import what simulates a scene, if the scene and its engine exist. ImportError says what to install.
+    """Import the engine of a scene, if the scene and the engine exist. ImportError says what to install.
 
-    A missing scene and an unknown engine are refused where the scene is loaded.
-    What goes to stderr is lost meanwhile: pybullet says on import when it was built.
+    A missing scene and an unknown engine are refused where the scene is loaded. Output to stderr is dropped, because
+    pybullet prints its build time on import.
     """
     with suppress(SceneError, OSError, ValueError), open(os.devnull, "wb") as nowhere, diverted(2, nowhere):
         path = find_scene(scene)

@@ -1,4 +1,4 @@
-"""`overlapper shapes`: what is modelled of a file, a line per link and kind of shape, and what is left out."""
+"""`overlapper shapes`: the modelled shapes of a file, a line per link and kind of shape, and the skipped shapes."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def _remarks(found: Inventory) -> list[str]:
 
 
 def _sizes(shapes: Sequence[ListedShape]) -> str:
-    """That of one, or of all if they are the same; else from the least to the largest side or number of corners."""
+    """The size, if all shapes have the same. Otherwise the ranges of sides and of numbers of corners."""
     if len({shape.size for shape in shapes}) == 1:
         return shapes[0].size
     sides = [side for shape in shapes for side in shape.box]

@@ -15,9 +15,9 @@ from overlapper.tables.summary import Summary
 
 
 def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
-    """The `limit` largest pairs, for a reader who knows nothing of this program. There must be at least one pair.
+    """The `limit` largest pairs, explained for a reader who does not know this program. There must be at least one.
 
-    `title` is that of the scene, by default its name.
+    `title` is by default the name of the scene.
     """
     pairs = summary.largest()
     unit = volume_unit(pairs[0].volume)
@@ -26,8 +26,8 @@ def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
     table = plain_table(
         title=f"Overlaps of {name} in {summary.steps} steps, {summary.seconds:.3g} s",
         caption="Volume: the largest in any step, with error bound ±. Depth: the shortest translation that separates "
-        "the two, or the deepest two of their shapes, in the step where it is largest. Normal: the direction of that "
-        "translation, for the first of the two." + " Force: the largest between the two." * summary.forces + left_out,
+        "the two links, or their two deepest shapes, in the step with the largest depth. Normal: the direction of this "
+        "translation, for the first link." + " Force: the largest between the two links." * summary.forces + left_out,
     )
     # Two lines a pair and narrow numbers, so that a terminal of 80 columns holds the table.
     table.add_column("pair of links", overflow="fold")

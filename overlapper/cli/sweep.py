@@ -182,7 +182,7 @@ def sweep(
 
 
 def _kept(text: str) -> int:
-    """The number of steps from one whose pairs are kept to the next; 0 for none."""
+    """The pairs of every n-th step are kept: n, or 0 if no pairs are kept."""
     every = re.fullmatch(r"every (\d+)", text.strip())
     if text in ("summary", "all"):
         return int(text == "all")
@@ -194,7 +194,7 @@ def _kept(text: str) -> int:
 def _run(
     todo: Sweep, store: Store, engine: Executor, limit: float | None, memory: int | None, retry: bool
 ) -> tuple[Reached, bool]:
-    """How far it came; False if it was interrupted."""
+    """The progress, and False if the sweep was interrupted."""
     from overlapper.scenes.parameters import described
     from overlapper.sweep.sweep import Progress as Reached
 

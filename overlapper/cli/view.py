@@ -144,7 +144,7 @@ def view(
 
 
 def _film(playback: Playback, html: Path, looks: Sequence[Look], written: list[Path]) -> bool:
-    """False if it was interrupted; then the page has what came before. KeyboardInterrupt if that is nothing."""
+    """False if it was interrupted. The page has the frames before. Without any, KeyboardInterrupt is raised."""
     from overlapper.tables.outputs import PICTURES_PER_SECOND, recorder
 
     html.parent.mkdir(parents=True, exist_ok=True)
@@ -185,7 +185,7 @@ def _picture(playback: Playback, png: Path, step: int | None, close: bool, looks
 
 
 def _live(playback: Playback, looks: Sequence[Look], host: str) -> None:
-    """As fast as the simulation is in the world, or as it can be; stays until it is interrupted, on a terminal."""
+    """Show the simulation in real time, or slower if it takes longer. On a terminal, stay until Ctrl-C."""
     from overlapper.tables.outputs import PICTURES_PER_SECOND
     from overlapper.viewer import Viewer
 
@@ -203,7 +203,7 @@ def _live(playback: Playback, looks: Sequence[Look], host: str) -> None:
 
 
 def _open(address: str) -> None:
-    """In a browser, for somebody who sits at a screen."""
+    """Open a browser, if there is a terminal and a screen."""
     if sys.stderr.isatty() and (sys.platform != "linux" or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ):
         typer.launch(address)
 

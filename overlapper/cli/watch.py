@@ -1,4 +1,4 @@
-"""`overlapper watch`: a script of one's own run as it is, and what its simulations share."""
+"""`overlapper watch`: runs an unchanged script and measures the overlaps of its simulations."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def _named(given: Sequence[str]) -> dict[int, str]:
 
 
 def _astray(context: typer.Context, arguments: Sequence[str]) -> list[str]:
-    """Options of ours among the arguments of the script, of those that do not stand before it as well."""
+    """The options of the watch among the arguments of the script, unless they also stand before the script."""
     ours = {option for each in context.command.params for option in each.opts if option.startswith("--")}
     before = {each.partition("=")[0] for each in sys.argv[: len(sys.argv) - len(arguments)]}
     return [name for each in arguments if (name := each.partition("=")[0]) in ours - before]
@@ -216,7 +216,7 @@ def _show(watches: Watches, interrupted: bool) -> None:
 
 
 def _not_watched(script: Path, watches: Watches, how: Mapping[str, Any], astray: Sequence[str]) -> list[str]:
-    """A sentence for all that was asked for and is not in the answer, but for shapes, which the summaries name."""
+    """A sentence for everything that was not measured or written, except shapes, which the summaries name."""
     told = []
     for watch, error in watches.failed:
         kept = f"; the steps before are in {' and '.join(map(str, watch.written))}" if watch.written else ""
