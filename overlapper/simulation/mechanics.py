@@ -59,6 +59,12 @@ class Dynamics(Protocol):
     def velocity(self) -> Array:
         """The velocities of all coordinates, in the order of the solver."""
 
+    def ahead(self, duration: float, velocity: Array) -> Sequence[Pose] | None:
+        """For each link: its centre of mass after a duration (s) at this velocity, and its rotation until then.
+
+        None if the solver finds them itself.
+        """
+
     def apply(self, wrenches: Array, frames: Sequence[Pose]) -> None:
         """Apply forces and torques (n, 6), about the origins of `frames`, to `links` in the next step."""
 

@@ -143,6 +143,13 @@ def test_a_box_that_is_not_gripped_hard_enough_slips(substeps):
     assert held.fallen < -0.01
 
 
+@pytest.mark.parametrize(("turn", "substeps"), [(1, 1), (3, 1), (3, 4)])
+def test_a_cube_that_sticks_to_a_turntable_does_not_creep(turn, substeps):
+    """Along tangents of its circle, it would creep outwards by turn² radius step / 2: 0.6 to 6 mm/s."""
+    outwards, slip = experiments.turntable(turn, substeps)
+    assert abs(outwards) < 1e-8 and slip < 1e-12
+
+
 def test_a_stack_of_five_stands():
     drift, speed = experiments.stack()
     assert drift < 1e-5 and speed < 1e-4

@@ -212,7 +212,9 @@ def test_the_solver_foretells_the_velocities_of_mujoco(damping, substeps):
         frames, found, velocity = dynamics.frames(), bodies.overlaps().overlaps, dynamics.velocity()
         count = np.ones(len(found))
         dynamics.solver.place(frames, found, links, 1e6 * count, 1e-3 * count, dynamics.friction(links[found.pairs]))
-        solved = dynamics.solver.solve(length, velocity, dynamics.acceleration, 0 * count, False)
+        solved = dynamics.solver.solve(
+            length, velocity, dynamics.acceleration, 0 * count, False, dynamics.ahead(length, velocity)
+        )
         wrenches, ours = solved[5], solved[6]
         dynamics.apply(wrenches, frames)
         if len(found) and not any(damping):
@@ -272,6 +274,22 @@ def test_what_a_constraint_carries_presses_with_its_weight(constraint):
         assert data.nefc == 1 and contact.on(0)[0] == pytest.approx([0, 0, -2.2 * G], rel=1e-6, abs=1e-6)
         assert 1e7 * contact.contacts.overlaps.volume == pytest.approx([2.2 * G], rel=1e-6)
     assert np.abs(data.qvel).max() < 1e-9
+
+
+def test_a_cube_that_sticks_to_a_turntable_does_not_creep():
+    """Along tangents of its circle, it would creep outwards by 5 mm/s."""
+    disc = '<geom type="box" size="0.6 0.6 0.05" mass="500"/>'
+    cube = free('<geom type="box" size="0.03 0.03 0.03" mass="1"/>', "0.3 0 1.0797275")
+    model, data = simulated(f'<body pos="0 0 1"><joint type="hinge" axis="0 0 1"/>{disc}</body>{cube}', step=0.004)
+    data.qvel[:] = [3, 0, 0.9, 0, 0, 0, 3]
+    with VolumetricContact(Bodies(model, data)) as contact:
+        for _ in range(750):
+            contact.step()
+        before = np.linalg.norm(data.qpos[1:3])
+        for _ in range(250):
+            contact.step()
+    assert abs(np.linalg.norm(data.qpos[1:3]) - before) < 1e-8
+    assert np.abs(contact.slip).max() < 1e-12
 
 
 def test_friction_is_that_of_mujoco():

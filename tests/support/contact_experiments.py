@@ -432,6 +432,40 @@ def grip(part: float, law="volumetric", substeps: Any = "auto", pushing=10.0, ma
         return Held(pressing, world.position(box)[2] - height, speed, (speed - before) / 0.5)
 
 
+def turntable(turn: float, substeps: int, radius=0.3, seconds=4) -> tuple[float, float]:
+    """The drift outwards in m/s of a cube on a disc that turns, in the last second, and its slip."""
+    with World() as world:
+        client = world.client
+        disc = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.6, 0.6, 0.05], physicsClientId=client)
+        table = p.createMultiBody(
+            0,
+            basePosition=[0, 0, 1],
+            linkMasses=[50],
+            linkCollisionShapeIndices=[disc],
+            linkVisualShapeIndices=[-1],
+            linkPositions=[[0, 0, 0]],
+            linkOrientations=[[0, 0, 0, 1]],
+            linkInertialFramePositions=[[0, 0, 0]],
+            linkInertialFrameOrientations=[[0, 0, 0, 1]],
+            linkParentIndices=[0],
+            linkJointTypes=[p.JOINT_REVOLUTE],
+            linkJointAxis=[[0, 0, 1]],
+            physicsClientId=client,
+        )
+        world.undamped(table, 1)
+        cube = world.box(0.03, 0.03, 0.03, position=[radius, 0, 1.08 - G / (1e7 * 0.06**2)], friction=1)
+        p.resetJointState(table, 0, 0, turn, physicsClientId=client)
+        p.resetBaseVelocity(cube, [0, turn * radius, 0], [0, 0, turn], physicsClientId=client)
+        with world.contact(substeps=substeps) as contact:
+            p.setJointMotorControl2(
+                table, 0, p.VELOCITY_CONTROL, targetVelocity=turn, force=1e4, physicsClientId=client
+            )
+            run(contact, seconds - 1)
+            before = float(np.linalg.norm(world.position(cube)[:2]))
+            run(contact, 1)
+            return float(np.linalg.norm(world.position(cube)[:2])) - before, float(np.abs(contact.slip).max())
+
+
 def stack(law="volumetric", stiffness=1e8, seconds=10.0, count=5, **parameters) -> tuple[float, float]:
     """A tower of cubes, each some millimetres aside: the way (m) of the worst in the second half, and its speed."""
     with World() as world:

@@ -86,6 +86,26 @@ class Links:
             orientations[hanging] = (turn * self.turns[hanging]).as_quat()
         return replace(self, positions=positions, orientations=orientations)
 
+    def after(self, duration: float, velocity: np.ndarray) -> tuple[np.ndarray, Rotation]:
+        """Where links are after a duration in which all coordinates keep their velocity, and how they have turned."""
+        positions, turns = self.positions.copy(), [Rotation.identity()] * len(self.links)
+        owners = np.array([at for at, _ in self.coordinates])
+        for i, link in enumerate(self.links):
+            own, parent = duration * velocity[owners == i], link.parent
+            if parent < 0:
+                positions[i] += own[:3]
+                turns[i] = Rotation.from_rotvec(own[3:])
+                continue
+            frame = self.turns[parent]
+            axes = self.turns[i].as_matrix().T if link.joint == SPHERICAL else [frame.apply(link.axis)]
+            by = own @ axes if len(own) else np.zeros(3)
+            joint = Rotation.from_rotvec(np.zeros(3) if link.joint == PRISMATIC else by)
+            pivot = self.positions[parent] + frame.apply(link.pivot)
+            moved = pivot + joint.apply(self.positions[i] - pivot) + (by if link.joint == PRISMATIC else 0)
+            positions[i] = positions[parent] + turns[parent].apply(moved - self.positions[parent])
+            turns[i] = turns[parent] * joint
+        return positions, Rotation.concatenate(turns)
+
     @cached_property
     def nearby(self) -> list[tuple[Links, Links]]:
         """By coordinate: the links a little before and a little after."""
@@ -248,6 +268,22 @@ class Scene:
         one, other = (self.links.jacobian(self.on[shape], at) for shape in pair)
         return one - other
 
+    def drift(self, pair: tuple[int, int], at: np.ndarray, staying: float) -> np.ndarray:
+        """(6,) the mean slip of a step at constant velocities, less that at its beginning."""
+        h, links = self.duration, self.links
+        on = [self.on[shape] for shape in pair]
+        spins = [(links.jacobian(link, at) @ self.velocity)[3:] for link in on]
+        first = np.linalg.norm(spins[0]) >= np.linalg.norm(spins[1])  # turns more, and is carried by the other
+        other, carrier = on if first else on[::-1]
+        (spin, around), sign = (spins, 1) if first else (spins[::-1], -1)
+        positions, turns = links.after(h, self.velocity)
+        carried = positions[carrier] + turns[carrier].apply(links.positions[other] - links.positions[carrier])
+        arm, beside = at - links.positions[other], spin - around
+        turning = np.cross(around, np.cross(beside, arm)) + staying * np.cross(beside, np.cross(spin, arm))
+        mean = (positions[other] - carried) / h + np.cross(beside, arm) + h / 2 * turning
+        turned = (turns[on[0]].as_rotvec() - turns[on[1]].as_rotvec()) / h
+        return np.concatenate([sign * mean, turned]) - self.jacobian(pair, at) @ self.velocity
+
 
 @dataclass(frozen=True)
 class Solution:
@@ -268,8 +304,11 @@ class Solution:
         return scene.velocity + scene.duration * (scene.acceleration + self.acceleration)
 
 
-def broken_laws(found: Solution, tolerance: float = 1e-8) -> list[str]:
-    """The laws of mechanics that a solution does not keep, as complaints."""
+def broken_laws(found: Solution, tolerance: float = 1e-8, staying: float = 0) -> list[str]:
+    """The laws of mechanics that a solution does not keep, as complaints.
+
+    `staying` is the share of the spins that moves surfaces away from the contacts, which the step before tells.
+    """
     scene, links = found.scene, found.scene.links
     inverse = links.inverse_mass()
     complaints = []
@@ -307,7 +346,8 @@ def broken_laws(found: Solution, tolerance: float = 1e-8) -> list[str]:
         before, after = rows @ scene.velocity, rows @ found.velocity
         speed = fastest + scene.duration * size * float(np.abs(mobility).max())
         along = np.eye(3) - np.outer(normal, normal)
-        ask("slip", found.slip[i], along @ after[:3], speed)
+        mean = after + scene.drift(pair, patch.found.centroid, staying)
+        ask("slip", found.slip[i], along @ mean[:3], speed)
 
         # Pressures: the springs' answer at the end of the step, or what of it lies on the patch.
         pressure = np.concatenate([normal * (found.force[i] @ normal), along @ found.torque[i]])
@@ -335,7 +375,7 @@ def broken_laws(found: Solution, tolerance: float = 1e-8) -> list[str]:
 
         # Friction: of all that is allowed, what takes away the most energy.
         limit = patch.friction * float(found.force[i] @ normal)
-        sliding, spin = along @ after[:3], float(normal @ after[3:])
+        sliding, spin = along @ mean[:3], float(normal @ mean[3:])
         drag, twist = along @ found.force[i], float(normal @ found.torque[i])
         power = float(drag @ sliding) + twist * spin
         if scene.distributed and patch.directed:

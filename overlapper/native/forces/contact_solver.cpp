@@ -16,12 +16,21 @@ constexpr int kVisits = 10000;
 constexpr int kFewest = 10;
 constexpr int kMost = 2000;
 
+/// The axis of a rotation times its angle in rad. NaN above a third of a turn, where rounding would matter.
+Vec3 rotation_vector(const Mat3& turn) {
+  const Vec3 twice{turn.row2.y - turn.row1.z, turn.row0.z - turn.row2.x, turn.row1.x - turn.row0.y};
+  const double sine = norm(twice) / 2, cosine = (turn.row0.x + turn.row1.y + turn.row2.z - 1) / 2;
+  if (!(sine > 0)) return cosine > 0 ? Vec3{} : Vec3{NAN, NAN, NAN};
+  return (cosine > -0.5 ? std::atan2(sine, cosine) / (2 * sine) : NAN) * twice;
+}
+
 }  // namespace
 
 struct ContactSolver::Laws {
   Pressure pressure;
   PatchFriction friction;
   Six wrench;
+  Drift drift;
 };
 
 ContactSolver::Row::Row(const ElasticPatch& patch)
@@ -203,6 +212,42 @@ ContactSolver::Six ContactSolver::known_wrench(size_t patch) const {
   return last ? rows_[patch].local(last->wrench) : Six{{std::max(0.0, patches_[patch].force), 0, 0}, {}};
 }
 
+/// The share of a body's spin that moves its surface away from the contact. It is 1 if the contact keeps its place, as
+/// an edge about which the body tips, and 0 if the contact goes on with the centre of the body, as below a wheel. The
+/// velocities are those of the centre, and of the surface at the contact relative to the centre.
+double ContactSolver::staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const {
+  const Known* last = known(patch.key);
+  if (!last || !(norm2(by_spin) > 0)) return 0;
+  const Vec3 moved = patch.centroid - last->centroid;
+  if (norm2(moved) == 0) return last->staying;  // the same poses again, or no motion
+  return std::clamp(overlapper::dot(moved / last->duration - centre_velocity, by_spin) / norm2(by_spin), 0.0, 1.0);
+}
+
+/// Without it, a body on a turntable leaves its circle along a tangent in every step. The body that turns less carries
+/// the other one around: what sticks to it moves along arcs. The other body may also turn relative to the first.
+ContactSolver::Drift ContactSolver::drift(size_t patch, const Step& step, std::span<const MovedOn> ahead) const {
+  const ElasticPatch& p = patches_[patch];
+  const double h = step.duration;
+  std::array<Vec3, 2> velocity, spin, bend, twist;
+  const std::array<int, 2> link{p.link_a, p.link_b};
+  for (int i = 0; i < 2; ++i) {
+    const auto [linear, angular] = bodies_.twist(link[i], step.velocity);
+    velocity[i] = linear, spin[i] = angular;
+    bend[i] = (ahead[link[i]].centre - bodies_.centre(link[i])) / h - linear;
+    twist[i] = rotation_vector(ahead[link[i]].turn) / h - angular;
+    if (!finite(twist[i])) return {};  // half a turn in a step has no direction
+  }
+  const int carrier = norm2(spin[0]) < norm2(spin[1]) ? 0 : 1, other = 1 - carrier;
+  const Vec3 apart = bodies_.centre(link[1]) - bodies_.centre(link[0]);
+  const Vec3 around = (ahead[link[carrier]].turn * apart - apart) / h - cross(spin[carrier], apart);
+  const Vec3 arm = p.centroid - bodies_.centre(link[other]), beside = spin[other] - spin[carrier];
+  const Vec3 by_spin = cross(spin[other], arm);
+  const double stays = staying(p, velocity[other], by_spin);
+  const Vec3 turning = cross(spin[carrier], cross(beside, arm)) + stays * cross(beside, by_spin);
+  const Vec3 along = bend[0] - bend[1] + around + (other == 0 ? h / 2 : -h / 2) * turning;
+  return {rows_[patch].local({along, twist[0] - twist[1]}).tangential, stays};
+}
+
 /// Updates pressures first, then friction, because pressures limit friction. Returns the change of the slip.
 double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const {
   const Row& row = rows_[patch];
@@ -210,7 +255,7 @@ double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span
   const Three without = slip.normal - duration * (row.normal_by_normal * last.normal);
   laws.wrench.normal = laws.pressure.answer(without);
   const Three pressed = laws.wrench.normal - last.normal;
-  const Three tangential = slip.tangential + duration * (row.tangential_by_normal * pressed);
+  const Three tangential = slip.tangential + laws.drift.slip + duration * (row.tangential_by_normal * pressed);
   laws.wrench.tangential = laws.friction.answer(tangential, last.tangential, laws.wrench.normal[0]);
   const Six change{pressed, laws.wrench.tangential - last.tangential};
   push(row, change, duration, velocity);
@@ -224,6 +269,9 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   const int count = int(rows_.size());
   std::vector<double> velocity(step.velocity.begin(), step.velocity.end());
   for (size_t i = 0; i < velocity.size(); ++i) velocity[i] += h * step.acceleration[i];
+  std::vector<MovedOn> found;
+  if (step.ahead.empty() && count > 0) found = bodies_.ahead(h, step.velocity);
+  const std::span<const MovedOn> ahead = step.ahead.empty() ? std::span<const MovedOn>(found) : step.ahead;
   std::vector<Laws> laws;
   laws.reserve(count);
   double largest = 0;
@@ -235,7 +283,8 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
     const Rule rule = step.damped[i] ? Rule::kDamping : Rule::kKeeping;
     laws.push_back({{patch, row.area, row.normal_by_normal, before.normal, h, rule},
                     {patch.friction, row.area, h * row.tangential_by_tangential, step.friction},
-                    known_wrench(i)});
+                    known_wrench(i),
+                    drift(i, step, ahead)});
     laws[i].wrench.tangential = laws[i].friction.begin(laws[i].wrench.tangential);
   }
   for (int i = 0; i < count; ++i) push(rows_[i], laws[i].wrench, h, velocity);
@@ -252,7 +301,7 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   }
   Solution solution = solved(laws, velocity);
   solution.sweeps = sweeps;
-  remember(solution);
+  remember(solution, laws, h);
   return solution;
 }
 
@@ -263,7 +312,7 @@ ContactSolver::Solution ContactSolver::solved(std::span<const Laws> laws, std::s
   for (size_t i = 0; i < laws.size(); ++i) {
     const ElasticPatch& patch = patches_[i];
     const Screw wrench = rows_[i].world(laws[i].wrench);
-    const Six slip{{}, slip_of(rows_[i], velocity).tangential};
+    const Six slip{{}, slip_of(rows_[i], velocity).tangential + laws[i].drift.slip};
     solution.patches.push_back({wrench.along, wrench.about, rows_[i].world(slip).along});
     push(rows_[i], laws[i].wrench, 1, solution.acceleration);
     for (const auto& [link, sign] : {std::pair{patch.link_a, 1.0}, std::pair{patch.link_b, -1.0}}) {
@@ -275,10 +324,15 @@ ContactSolver::Solution ContactSolver::solved(std::span<const Laws> laws, std::s
   return solution;
 }
 
-void ContactSolver::remember(const Solution& solution) {
+void ContactSolver::remember(const Solution& solution, std::span<const Laws> laws, double duration) {
   known_.clear();
   for (size_t i = 0; i < patches_.size(); ++i)
-    known_.push_back({patches_[i].key, patches_[i].normal, {solution.patches[i].force, solution.patches[i].torque}});
+    known_.push_back({patches_[i].key,
+                      patches_[i].normal,
+                      patches_[i].centroid,
+                      {solution.patches[i].force, solution.patches[i].torque},
+                      duration,
+                      laws[i].drift.staying});
   std::ranges::sort(known_, {}, &Known::key);
 }
 

@@ -39,6 +39,7 @@ class ContactSolver {
     std::span<const double> acceleration;  ///< without the patches
     std::span<const char> damped;          ///< per patch: whether to choose stability over energy (backward Euler)
     Friction friction = Friction::kEllipsoid;
+    std::span<const MovedOn> ahead;  ///< the links at the end, with that velocity; found here for bodies with links
   };
 
   struct Solution {
@@ -94,6 +95,12 @@ class ContactSolver {
     Mat3 angular;       ///< 1/(kg m²), in the world
   };
 
+  /// How much the mean of the slip over a step differs from the slip at its beginning, because bodies turn.
+  struct Drift {
+    Three slip;      ///< tangential
+    double staying;  ///< the share of a spin that moves a body's surface away from the contact
+  };
+
   /// The laws of a patch in a step, and its present wrench.
   struct Laws;
 
@@ -104,15 +111,18 @@ class ContactSolver {
   Six slip_of(const Row& row, std::span<const double> velocity) const;
   void push(const Row& row, const Six& wrench, double factor, std::span<double> velocity) const;
   Six known_wrench(size_t patch) const;
+  double staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const;
+  Drift drift(size_t patch, const Step& step, std::span<const MovedOn> ahead) const;
   double visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const;
   Solution solved(std::span<const Laws> laws, std::span<const double> velocity) const;
-  void remember(const Solution& solution);
+  void remember(const Solution& solution, std::span<const Laws> laws, double duration);
 
   /// The solution of a patch, as a start for the next step.
   struct Known {
     std::int64_t key;
-    Vec3 normal;
+    Vec3 normal, centroid;
     Screw wrench;
+    double duration, staying;
   };
   const Known* known(std::int64_t key) const;
 

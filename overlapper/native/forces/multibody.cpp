@@ -24,6 +24,18 @@ int coordinates_of(Joint joint) {
   return 0;
 }
 
+/// The rotation by a vector: about its direction, by its length in rad.
+Mat3 rotation_by(Vec3 vector) {
+  const double angle = norm(vector);
+  if (!(angle > 0)) return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  const Vec3 a = vector / angle;
+  const double half = std::sin(angle / 2), versine = 2 * half * half;
+  const Vec3 s = std::sin(angle) * a, v = versine * a;
+  return {{1 - v.y * a.y - v.z * a.z, v.x * a.y - s.z, v.x * a.z + s.y},
+          {v.y * a.x + s.z, 1 - v.x * a.x - v.z * a.z, v.y * a.z - s.x},
+          {v.z * a.x - s.y, v.z * a.y + s.x, 1 - v.x * a.x - v.y * a.y}};
+}
+
 /// Inverts the symmetric matrix in place by Cholesky's method. A coordinate without mass does not move.
 void invert(std::vector<double>& m, int n) {
   const auto at = [&](int i, int j) -> double& { return m[size_t(i) * n + j]; };
@@ -171,6 +183,32 @@ std::array<Vec3, 2> Multibodies::twist(int link, std::span<const double> velocit
     angular += v[column] * by.angular;
   }
   return {linear, angular};
+}
+
+std::vector<MovedOn> Multibodies::ahead(double duration, std::span<const double> velocity) const {
+  std::vector<MovedOn> moved(links_.size());
+  for (int i = 0; i < links(); ++i) {
+    const TreeLink& link = links_[i];
+    const Body& body = bodies_[body_[i]];
+    const double* v = velocity.data() + body.first_coordinate;
+    const Vec3 centre = frames_[i].translation;
+    if (link.parent < 0) {
+      moved[i] = {centre + duration * Vec3{v[0], v[1], v[2]}, rotation_by(duration * Vec3{v[3], v[4], v[5]})};
+      continue;
+    }
+    const MovedOn& parent = moved[link.parent];
+    const Vec3 from = frames_[link.parent].translation;
+    const int own = coordinates_of(link.joint);
+    Vec3 slide, turn, pivot = centre;
+    for (size_t k = moved_[i].size() - own; k < moved_[i].size(); ++k) {
+      const Motion& by = motions_[body.first_coordinate + moved_[i][k]];
+      slide += duration * v[moved_[i][k]] * by.linear, turn += duration * v[moved_[i][k]] * by.angular;
+      pivot = by.point;
+    }
+    const Mat3 joint = rotation_by(turn);
+    moved[i] = {parent.centre + parent.turn * ((pivot - from) + joint * (centre - pivot) + slide), parent.turn * joint};
+  }
+  return moved;
 }
 
 void Multibodies::find_inverse_mass(int number) {

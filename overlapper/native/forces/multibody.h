@@ -27,6 +27,12 @@ struct Motion {
   Vec3 linear, angular, point;
 };
 
+/// A link after some time: its centre of mass, and its rotation since.
+struct MovedOn {
+  Vec3 centre;
+  Mat3 turn;
+};
+
 /// A link whose motion a simulator knows: its tree, -1 for a link that stands still, and the coordinates that move it,
 /// among those of the tree.
 struct MovedLink {
@@ -54,6 +60,7 @@ class Multibodies {
   Multibodies(std::span<const std::int64_t> coordinates, std::vector<MovedLink> links);
 
   int links() const { return int(links_.size()); }
+  bool has_links() const { return bodies_.empty() || bodies_[0].links > 0; }
   std::span<const Body> bodies() const { return bodies_; }
   int body_of(int link) const { return body_[link]; }
   int coordinates() const { return coordinates_; }
@@ -72,6 +79,9 @@ class Multibodies {
 
   /// The linear velocity of a link's centre of mass, and its angular velocity, from the velocities of all coordinates.
   std::array<Vec3, 2> twist(int link, std::span<const double> velocity) const;
+
+  /// The links after `duration` (s), if all coordinates keep their velocities. Only for bodies that have `links`.
+  std::vector<MovedOn> ahead(double duration, std::span<const double> velocity) const;
 
   /// The inverse mass matrix by rows; zeros for coordinates that forces do not move.
   std::span<const double> inverse_mass(int body) const { return inverse_mass_[body]; }

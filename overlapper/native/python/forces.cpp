@@ -65,13 +65,15 @@ void move(ContactSolver& solver, nb::handle linear_given, nb::handle angular_giv
   solver.bodies().move(std::move(motions), inverse_mass, int(width));
 }
 
+Pose to_pose(nb::handle given) {
+  const Frame frame = to_frame(given);
+  return make_placed(Sphere(1), frame.position, frame.orientation).pose;
+}
+
 nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps& found, nb::handle links_given,
                  nb::handle stiffness_given, nb::handle dissipation_given, nb::handle friction_given) {
   std::vector<Pose> frames;
-  for (nb::handle each : frames_given) {
-    const Frame frame = to_frame(each);
-    frames.push_back(make_placed(Sphere(1), frame.position, frame.orientation).pose);
-  }
+  for (nb::handle each : frames_given) frames.push_back(to_pose(each));
   const size_t count = found.size(), links = size_t(solver.bodies().links());
   if (frames.size() != links) fail("frames", "must be one for each link");
   const auto link_of = to_indices(links_given, "links");
@@ -106,17 +108,27 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
 }
 
 nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_given, nb::handle acceleration_given,
-                nb::handle damped_given, bool distributed) {
+                nb::handle damped_given, bool distributed, nb::handle ahead_given) {
   const size_t coordinates = solver.bodies().coordinates(), count = solver.patches().size();
   const auto velocity = numbers(velocity_given, "velocity", coordinates);
   const auto acceleration = numbers(acceleration_given, "acceleration", coordinates);
   std::vector<char> damped;
   for (double each : numbers(damped_given, "damped", count)) damped.push_back(each != 0);
+  std::vector<MovedOn> ahead;
+  if (!ahead_given.is_none()) {
+    for (nb::handle each : ahead_given) {
+      const Pose pose = to_pose(each);
+      ahead.push_back({pose.translation, pose.rotation});
+    }
+    if (ahead.size() != size_t(solver.bodies().links())) fail("ahead", "must be one for each link");
+  } else if (!solver.bodies().has_links()) {
+    fail("ahead", "must be given for the trees of a simulator");
+  }
   ContactSolver::Solution solution;
   {
     const nb::gil_scoped_release release;
     solution = solver.solve(
-        {duration, velocity, acceleration, damped, distributed ? Friction::kDistributed : Friction::kEllipsoid});
+        {duration, velocity, acceleration, damped, distributed ? Friction::kDistributed : Friction::kEllipsoid, ahead});
   }
   std::vector<Vec3> force, torque, slip, normal;
   for (const PatchForce& each : solution.patches)
@@ -224,14 +236,18 @@ stiffness in Pa/m, dissipation in s, and the coefficient of friction. The answer
 `duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.)");
   cls.def(
       "solve", &solve, "duration"_a, "velocity"_a, "acceleration"_a, "damped"_a, "distributed"_a,
+      "ahead"_a.none() = nb::none(),
       nb::sig("def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: "
-              "numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike, distributed: bool) -> "
+              "numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike, distributed: bool, ahead: "
+              "collections.abc.Sequence[typing.Any] | None = None) -> "
               "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.float64], int]"),
       R"(The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
-without the patches; rows that are `damped` choose stability over energy.
+without the patches; rows that are `damped` choose stability over energy. `ahead` has a pair for each link: the position
+of its centre of mass after the step, in m, if the coordinates keep their velocity, and the quaternion xyzw of its rotation
+until then. It is needed for the trees of a simulator.
 
 (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
 last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and

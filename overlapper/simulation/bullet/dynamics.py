@@ -129,6 +129,9 @@ class BulletDynamics:
             velocity[at] = [each for state in states for each in state[1]]
         return velocity
 
+    def ahead(self, duration: float, velocity: Array) -> None:
+        return None
+
     def apply(self, wrenches: NDArray[np.float64], frames: Sequence[Any]) -> None:
         """Let forces and torques (n, 6) about their centres of mass act on the links in the simulator's next step."""
         client, axes = self._client, pybullet.WORLD_FRAME

@@ -384,8 +384,9 @@ class VolumetricContact:
             planned = 1 if whole else self._planned or MOST_SUBSTEPS
             self._told.of_substeps(self._contacts, damped, frequency2, duration, planned)
         wrenches: Array
-        force, torque, slip, normal, directed, wrenches, ours, self.sweeps = self._masses.dynamics.solver.solve(
-            duration, velocity, other, damped, self._layers.distributed
+        dynamics = self._masses.dynamics
+        force, torque, slip, normal, directed, wrenches, ours, self.sweeps = dynamics.solver.solve(
+            duration, velocity, other, damped, self._layers.distributed, dynamics.ahead(duration, velocity)
         )
         self._found = Forces(self._contacts, force, torque, slip, normal, directed, self._stiffness)
         if not directed.all():

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import _core
+from overlapper.quaternion import composed
 from overlapper.simulation.layout import FARTHEST, Pose
 from overlapper.simulation.model import Array
 from overlapper.simulation.mujoco.friction import friction
@@ -54,6 +55,7 @@ class MujocoDynamics:
         self._units = np.zeros((width, model.nv))  # row k has 1 at the k-th coordinate of each tree
         for tree in self._trees:
             self._units[range(tree.stop - tree.start), range(tree.start, tree.stop)] = 1
+        self._later = mujoco.MjData(model)
         self._roots = model.body_rootid[model.dof_bodyid]
         self.acceleration: Array = np.zeros(model.nv)  # without contacts, at the last `frames`
 
@@ -106,6 +108,17 @@ class MujocoDynamics:
 
     def velocity(self) -> Array:
         return np.array(self._data.qvel)
+
+    def ahead(self, duration: float, velocity: Array) -> list[Pose]:
+        data, later = self._data, self._later
+        later.qpos[:] = data.qpos
+        later.mocap_pos[:], later.mocap_quat[:] = data.mocap_pos, data.mocap_quat
+        mujoco.mj_integratePos(self._model, later.qpos, velocity, duration)
+        mujoco.mj_kinematics(self._model, later)
+        # MuJoCo's quaternions are wxyz.
+        before, after = (each.xquat[self._bodies][:, [1, 2, 3, 0]] for each in (data, later))
+        turns = composed(after, before * (-1, -1, -1, 1))
+        return [*zip(later.xipos[self._bodies].tolist(), turns.tolist())]
 
     def apply(self, wrenches: NDArray[np.float64], frames: Sequence[Pose]) -> None:
         """Let forces and torques (n, 6) about the centres of mass act in the next step, and no others."""

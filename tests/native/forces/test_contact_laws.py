@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanics import PRISMATIC, REVOLUTE, SPHERICAL, Link, Links, Scene, broken_laws
+from mechanics import PRISMATIC, REVOLUTE, SPHERICAL, Link, Links, Scene, Solution, broken_laws
 from scipy.spatial.transform import Rotation
 from strategies import directions, quaternion
 
@@ -239,7 +239,33 @@ def test_a_body_inside_another_is_pushed_in_its_last_direction():
     assert not found.directed.any() and found.normal[0] == pytest.approx([-1, 0, 0], abs=1e-12)
     assert found.force[0] @ found.normal[0] == pytest.approx(1e5 * deep.patches()[0].found.volume, rel=1e-12)
     assert found.torque[0] == pytest.approx(np.zeros(3), abs=1e-15)
-    assert broken_laws(found) == []
+    (now,), (then,) = deep.patches(), drawn.patches()
+    moved = 240 * (now.found.centroid - then.found.centroid)
+    by_spin = np.cross(velocity[15:], now.found.centroid)
+    staying = np.clip((moved - velocity[12:15]) @ by_spin / (by_spin @ by_spin), 0, 1)
+    assert broken_laws(found, staying=staying) == []
+
+
+@pytest.mark.parametrize("staying", [0, 1])
+def test_a_contact_keeps_its_place_or_goes_on_with_the_body(staying):
+    """The step before tells which, and the same poses again change nothing."""
+    links = at_rest(Link(mass=0), Link(inertia=[1e-3] * 3), positions=[(0, 0, 0), (0.02, 0.01, HALF)])
+    velocity = np.array([0] * 6 + [0.3, 0.2, 0, 2, 1, 4])  # the surface moves level
+    before = cube_on(links, velocity=velocity, friction=0.1)
+    first = before.solve()
+    assert broken_laws(first) == []
+    (patch,) = before.patches()
+    by_spin = np.cross(velocity[9:], patch.found.centroid - links.positions[1])
+    moved = (velocity[6:9] + staying * by_spin) / 240
+    after = replace(
+        before,
+        links=replace(links, positions=links.positions + [np.zeros(3), moved]),
+        shapes=[before.shapes[0], Placed(Box([HALF] * 3), np.add((0, 0, HALF - 1e-3), moved))],
+    )
+    for _ in range(2):
+        after.place(before.solver)
+        found = Solution(after, *before.solver.solve(1 / 240, velocity, np.zeros(12), np.array([False]), False))
+        assert broken_laws(found, staying=staying) == []
 
 
 def told(solution):

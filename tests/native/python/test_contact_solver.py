@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from overlapper import Box, HalfSpace, _core, overlaps
 
@@ -90,7 +91,9 @@ def test_a_tree_with_given_masses_moves_as_the_body_with_these_masses():
     rng = np.random.default_rng(5)
     velocity, acceleration = rng.normal(scale=0.1, size=(2, 6))
     of_body = body.solve(1e-3, [0] * 6 + [*velocity], [0] * 6 + [*acceleration], [False], False)
-    of_tree = tree.solve(1e-3, shift @ velocity, shift @ acceleration, [False], False)
+    later = (0, 0, HALF - 1e-4) + 1e-3 * velocity[:3], Rotation.from_rotvec(1e-3 * velocity[3:]).as_quat()
+    ahead = [((0, 0, 0), TURN), later]
+    of_tree = tree.solve(1e-3, shift @ velocity, shift @ acceleration, [False], False, ahead)
     for ours, theirs in zip(of_tree[:3], of_body[:3]):
         assert ours == pytest.approx(theirs, rel=1e-10, abs=1e-12)
     assert of_tree[5] == pytest.approx(of_body[5], rel=1e-10, abs=1e-12)
@@ -107,7 +110,8 @@ def test_links_of_one_tree_push_each_other_through_their_common_masses():
     inverse = np.linalg.inv([[4, 1], [1, 1]])
     tree.move(up, still, still, inverse)
     placed(1e-4, solver=tree)
-    force, *_, ours, _sweeps = tree.solve(1e-3, [0, 0], [0, 0], [False], False)
+    ahead = [((0, 0, 0), TURN), ((0, 0, HALF - 1e-4), TURN)]
+    force, *_, ours, _sweeps = tree.solve(1e-3, [0, 0], [0, 0], [False], False, ahead)
     pressing = -force[0, 2]
     assert pressing > 9 and ours == pytest.approx([-pressing / 3, pressing * (1 + 1 / 3)], rel=1e-12)
 
@@ -208,6 +212,10 @@ def test_invalid_steps_are_refused():
         solver.solve(0.01, rest, np.zeros(13), undamped, False)
     with pytest.raises(ValueError, match=r"^damped must have 1 numbers, not 2$"):
         solver.solve(0.01, rest, rest, np.array([False, True]), False)
+    with pytest.raises(ValueError, match=r"^ahead must be one for each link$"):
+        solver.solve(0.01, rest, rest, undamped, False, [((0, 0, 0), TURN)])
+    with pytest.raises(ValueError, match=r"^ahead must be given for the trees of a simulator$"):
+        cube_as_a_tree().solve(0.01, rest[:6], rest[:6], [], False)
     with pytest.raises(ValueError, match=r"^links must be places of links$"):
         solver.ahead(0.01, rest, np.array([2]), [(0, 0, 0)], [TURN])
     with pytest.raises(ValueError, match=r"^positions must have 3 numbers, not 6$"):
