@@ -79,10 +79,13 @@ class Mechanics(Protocol):
     def dynamics(self, bodies: Sequence[int]) -> Dynamics:
         """The masses and joints of these bodies."""
 
-    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None]) -> None:
+    def enter(
+        self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None], step: Callable[[], None]
+    ) -> None:
         """Turn the simulator's own response to these pairs off. RuntimeError if the simulation is within another.
 
-        A simulator that can ask for forces within its own steps calls `answer`, which calls `Dynamics.apply`.
+        If the script lets the simulator step, a simulator that can ask for forces within its step calls `answer`, which
+        calls `Dynamics.apply`. For another simulator, `step` makes the whole step instead.
         """
 
     def turn_off(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:

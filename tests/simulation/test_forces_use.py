@@ -1,5 +1,6 @@
 """Volumetric contact in a script: its arguments, Bullet's own response, and what else a script tells the simulator."""
 
+import contextlib
 import math
 import re
 
@@ -9,6 +10,7 @@ import pytest
 from contact_experiments import HALF, STEP, G, World, run
 from simulated import box, ground, jointed
 
+import overlapper
 from overlapper.simulation import Bodies, Recorder, SubstepsWarning, VolumetricContact
 
 
@@ -469,3 +471,34 @@ def test_forces_serve_a_script_that_integrates(world):
             speed += (contact.forces().on(cube)[0][2] - G) * STEP
             height += speed * STEP
     assert HALF - height == pytest.approx(G / 1e5, rel=1e-3)
+
+
+# Steps by other code
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_step_simulation_within_the_block_is_a_step(world, recorded):
+    """Code that steps by itself, such as a gymnasium environment, works without a change."""
+    cube = resting(world)
+    other = p.connect(p.DIRECT)
+    original = p.stepSimulation
+    with Recorder(world.client) if recorded else contextlib.nullcontext() as recorder:
+        contact = VolumetricContact(Bodies(world.client, recorder=recorder), substeps=4)
+        steps = []
+        with overlapper.watch(world.client) as watch, contact:
+            for step in (p.stepSimulation, lambda: p.stepSimulation(physicsClientId=world.client)) * 60:
+                assert step(*[world.client] * (step is p.stepSimulation)) == ()
+                steps.append(contact.substeps)
+            p.stepSimulation(other)  # a client of its own
+        assert watch.steps == 120 and set(steps) == {4}
+        assert world.position(cube)[2] == pytest.approx(HALF - G / 1e5, abs=1e-9)
+        assert contact.on(cube)[0][2] == pytest.approx(G, rel=1e-6)
+    assert p.stepSimulation is original
+    p.disconnect(other)
+
+
+def test_a_warning_within_step_simulation_names_the_line_that_calls_it(world):
+    resting(world)
+    with world.contact(stiffness=1e12, substeps=1), pytest.warns(SubstepsWarning) as caught:
+        p.stepSimulation(world.client)
+    assert caught[0].filename == __file__

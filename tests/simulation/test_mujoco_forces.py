@@ -205,7 +205,7 @@ def test_the_solver_foretells_the_velocities_of_mujoco(damping, substeps):
     links = np.array([dynamics.place[body, geom] for body, geom, _ in bodies.keys])
     pressed, length = 0, STEP / substeps
     stepping.length = length
-    stepping.enter(bodies.link_pairs(), list)
+    stepping.enter(bodies.link_pairs(), list, list)
     for _ in range(400 * substeps):
         stepping.prepare()
         bodies.follow()

@@ -81,6 +81,7 @@ Listener = Callable[[str, Arguments, Any], None]
 
 _ORIGINALS: dict[str, Callable[..., Any]] = {}
 _listeners: list[Listener] = []
+_steps: dict[int, Callable[[], None]] = {}  # what makes the steps of clients in place of stepSimulation
 
 
 def listen(listener: Listener) -> None:
@@ -99,6 +100,16 @@ def unlisten(listener: Listener) -> None:
         if not _listeners:
             for name, original in _ORIGINALS.items():
                 setattr(pybullet, name, original)
+
+
+def replace_steps(client: int, step: Callable[[], None] | None) -> None:
+    """Let calls of stepSimulation for a client call `step`, which tells listeners itself. None ends this.
+
+    It needs a listener.
+    """
+    _steps.pop(client, None)
+    if step:
+        _steps[client] = step
 
 
 def unheard(name: str) -> Callable[..., Any]:
@@ -126,8 +137,11 @@ class _Heard:
         return types.BuiltinFunctionType
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        result = _ORIGINALS[self._name](*args, **kwargs)
         arguments = dict(zip(CALLS[self._name], args)) | kwargs
+        if self._name == "stepSimulation" and (step := _steps.get(arguments.get("physicsClientId", 0))):
+            step()
+            return ()  # as stepSimulation
+        result = _ORIGINALS[self._name](*args, **kwargs)
         for listener in tuple(_listeners):
             listener(self._name, arguments, result)
         return result

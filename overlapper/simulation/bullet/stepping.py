@@ -7,7 +7,7 @@ from weakref import WeakValueDictionary
 
 import pybullet
 
-from overlapper.simulation.bullet.calls import listen, tell, unheard, unlisten
+from overlapper.simulation.bullet.calls import listen, replace_steps, tell, unheard, unlisten
 from overlapper.simulation.bullet.commands import Commands
 from overlapper.simulation.bullet.dynamics import BulletDynamics
 from overlapper.simulation.bullet.recorder import Recorder
@@ -41,7 +41,9 @@ class Stepping:
     def dynamics(self, bodies: Sequence[int]) -> BulletDynamics:
         return BulletDynamics(self._client, bodies)
 
-    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None]) -> None:
+    def enter(
+        self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None], step: Callable[[], None]
+    ) -> None:
         if self._client in _INSIDE:
             raise RuntimeError(
                 f"physicsClientId {self._client} already has an active VolumetricContact: leave its `with` block first"
@@ -51,12 +53,14 @@ class Stepping:
         if not self._recorder:
             self._commands.learn()
             listen(self._commands.hear)
+        replace_steps(self._client, step)
 
     def turn_off(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
         self._response.turn_off(pairs)
 
     def leave(self) -> None:
         _INSIDE.pop(self._client, None)
+        replace_steps(self._client, None)
         if not self._recorder:
             unlisten(self._commands.hear)
         if pybullet.isConnected(self._client):

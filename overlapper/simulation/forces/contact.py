@@ -31,7 +31,7 @@ class VolumetricContact:
         contact = VolumetricContact(bodies)
         with contact:
             while ...:
-                contact.step()  # instead of pybullet.stepSimulation() or mujoco.mj_step(model, data)
+                contact.step()  # or pybullet.stepSimulation(), or mujoco.mj_step(model, data)
 
     Parameters
     ----------
@@ -83,6 +83,10 @@ class VolumetricContact:
     Within the `with`, the simulator does not respond to these pairs, whether they touch or not. It has no contact
     points of them. It simulates everything else: joints, motors, constraints and, in pybullet, other pairs.
 
+    Other code that steps the simulation within the `with`, such as a gymnasium environment, works without a change. In
+    pybullet, a call of stepSimulation makes a `step()`, unless its name was imported from pybullet earlier. In MuJoCo,
+    each mj_step is one substep.
+
     In pybullet, a `Bodies` with a recorder knows which pairs a script has filtered. Without a recorder, filtered pairs
     are pushed apart, too. All other forces on the bodies (gravity, motors, constraints, forces of the script) are
     assumed to be as in the substep before. Within the `with`, the script's commands to motors and constraints and the
@@ -93,8 +97,7 @@ class VolumetricContact:
     In MuJoCo, all other forces are known, because MuJoCo computes them first. Its contacts can only be turned off for
     all pairs at once, so `pairs` must contain all pairs that it lets collide. The flag belongs to the model: other data
     of the same model have no contacts within the `with`, either. `data.xfrc_applied` keeps the forces of the script.
-    After `step()`, `data` has the poses from before the last integration, as after mj_step. A loop of mj_step within
-    the `with` works without a change. Each of its steps is one substep.
+    After `step()`, `data` has the poses from before the last integration, as after mj_step.
 
     A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning. The other bodies continue.
 
@@ -141,7 +144,7 @@ class VolumetricContact:
 
     def __enter__(self) -> VolumetricContact:
         self._rules = self.bodies.rules
-        self._mechanics.enter(self.bodies.link_pairs(self._among), self._answer)
+        self._mechanics.enter(self.bodies.link_pairs(self._among), self._answer, self._step_instead)
         self._inside = True
         return self
 
@@ -308,6 +311,14 @@ class VolumetricContact:
 
     def __repr__(self) -> str:
         return f"VolumetricContact({len(self)} pairs of shapes press, {self.substeps} substeps)"
+
+    def _step_instead(self) -> None:
+        """Make the step that the script asks the simulator for."""
+        self._told.further = 2  # this call and the one that stands in for the simulator's
+        try:
+            self.step()
+        finally:
+            self._told.further = 0
 
     def _answer(self) -> None:
         """Apply the forces of a step that the simulator makes by itself, in one piece."""

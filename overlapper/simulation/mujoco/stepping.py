@@ -57,7 +57,9 @@ class MujocoStepping:
     def dynamics(self, bodies: Sequence[int]) -> MujocoDynamics:
         return MujocoDynamics(self, bodies)
 
-    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None]) -> None:
+    def enter(
+        self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None], step: Callable[[], None]
+    ) -> None:
         global _before
         if self.data in _inside:
             raise RuntimeError("data already has an active VolumetricContact: leave its `with` block first")
