@@ -101,6 +101,7 @@ def physics_table(of: Figures) -> str:
             "a box gripped by 0.99 *mg/2F*: its acceleration, over *g*", "0.0100",
             *(f"{of['grip', law, 'acceleration']['0.99']:.4f}" for law in LAWS),
         ],
+        ["a cube on a turntable, 3 rad/s: its drift outwards", "0", *most("turntable", "drift", "3", " m/s")],
         [
             "stack of five, drift from 5 to 10 s", "0",
             f"{small(of['stack', 'volumetric', '1e8 Pa/m']['drift'])} m at 1e8, "

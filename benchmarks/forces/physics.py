@@ -136,6 +136,11 @@ def grips() -> Iterator[Row]:
         yield Row("grip", law, "acceleration", 0.99, -experiments.grip(0.99, law).acceleration / G)
 
 
+def turntables() -> Iterator[Row]:
+    for law in LAWS:
+        yield Row("turntable", law, "drift", 3, abs(experiments.turntable(3, law)[0]))
+
+
 def stacks() -> Iterator[Row]:
     for stiffness, name in ((1e8, "1e8 Pa/m"), (1e7, "1e7 Pa/m")):
         drift, speed = experiments.stack(stiffness=stiffness)
@@ -162,7 +167,8 @@ def loops() -> Iterator[Row]:
 
 
 PARTS = (
-    rests, bounces, rebounds, slides, inclines, shoves, spins, slides_and_spins, rolls, pushes, grips, stacks, loops,
+    rests, bounces, rebounds, slides, inclines, shoves, spins, slides_and_spins, rolls, pushes, grips,
+    turntables, stacks, loops,
 )  # fmt: skip
 
 

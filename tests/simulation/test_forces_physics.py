@@ -146,7 +146,7 @@ def test_a_box_that_is_not_gripped_hard_enough_slips(substeps):
 @pytest.mark.parametrize(("turn", "substeps"), [(1, 1), (3, 1), (3, 4)])
 def test_a_cube_that_sticks_to_a_turntable_does_not_creep(turn, substeps):
     """Along tangents of its circle, it would creep outwards by turn² radius step / 2: 0.6 to 6 mm/s."""
-    outwards, slip = experiments.turntable(turn, substeps)
+    outwards, slip = experiments.turntable(turn, substeps=substeps)
     assert abs(outwards) < 1e-8 and slip < 1e-12
 
 

@@ -432,8 +432,8 @@ def grip(part: float, law="volumetric", substeps: Any = "auto", pushing=10.0, ma
         return Held(pressing, world.position(box)[2] - height, speed, (speed - before) / 0.5)
 
 
-def turntable(turn: float, substeps: int, radius=0.3, seconds=4) -> tuple[float, float]:
-    """The drift outwards in m/s of a cube on a disc that turns, in the last second, and its slip."""
+def turntable(turn: float, law="volumetric", substeps: Any = 1, radius=0.3, seconds=4) -> tuple[float, float]:
+    """The drift outwards in m/s of a cube on a disc that turns, in the last second, and its slip (0 for Bullet)."""
     with World() as world:
         client = world.client
         disc = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.6, 0.6, 0.05], physicsClientId=client)
@@ -456,14 +456,15 @@ def turntable(turn: float, substeps: int, radius=0.3, seconds=4) -> tuple[float,
         cube = world.box(0.03, 0.03, 0.03, position=[radius, 0, 1.08 - G / (1e7 * 0.06**2)], friction=1)
         p.resetJointState(table, 0, 0, turn, physicsClientId=client)
         p.resetBaseVelocity(cube, [0, turn * radius, 0], [0, 0, turn], physicsClientId=client)
-        with world.contact(substeps=substeps) as contact:
+        with world.contact(law, substeps) as contact:
             p.setJointMotorControl2(
                 table, 0, p.VELOCITY_CONTROL, targetVelocity=turn, force=1e4, physicsClientId=client
             )
             run(contact, seconds - 1)
             before = float(np.linalg.norm(world.position(cube)[:2]))
             run(contact, 1)
-            return float(np.linalg.norm(world.position(cube)[:2])) - before, float(np.abs(contact.slip).max())
+            slip = float(np.abs(contact.slip).max()) if law == "volumetric" else 0.0
+            return float(np.linalg.norm(world.position(cube)[:2])) - before, slip
 
 
 def stack(law="volumetric", stiffness=1e8, seconds=10.0, count=5, **parameters) -> tuple[float, float]:
