@@ -1,4 +1,6 @@
-"""FCL's answer for the same shapes and poses, and which answer is nearer to the truth if it differs from ours.
+"""Another program's answer for the same shapes and poses, and which is nearer to the truth if it differs from ours.
+
+`Fcl` asks FCL about any pair. `Mujoco` asks MuJoCo about the geoms of a running simulation.
 
 FCL (python-fcl) runs in a separate process. For some pairs that barely touch, its signed distance ends the process by a
 C++ exception that no `except` in Python can catch.
@@ -6,15 +8,15 @@ C++ exception that no `except` in Python can catch.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from overlapper import Overlap
+from overlapper import Ellipsoid, Overlap
 from overlapper.install import hint
 from overlapper.jobs.worker import Ended, NotStarted, Worker
 from overlapper.proof.signed_distance import signed_distance_bounds
@@ -29,10 +31,14 @@ except ImportError:
 # For each of the two bodies its model and its pose: quaternion wxyz, position.
 Request = tuple[tuple[FclModel, tuple[Any, Any]], ...]
 
-# FCL's default distance_tolerance, in m, which python-fcl cannot change. EPA stops when its bounds of the depth differ
-# by less. The distance search stops when a step gains less, which does not bound its error. Beside curved shapes, its
-# result has been 2e-4 m too large. Such pairs are disagreements and are settled exactly.
-FCL_TOLERANCE = 1e-6
+# FCL's default distance_tolerance, in m, which python-fcl cannot change, and MuJoCo's default ccd_tolerance. EPA stops
+# when its bounds of the depth differ by less. FCL's distance search stops when a step gains less, which does not bound
+# its error. Beside curved shapes, its result has been 2e-4 m too large. Such pairs are disagreements and are settled
+# exactly.
+TOLERANCE = 1e-6
+
+By = Literal["fcl", "mujoco"]
+NAMES: dict[By, str] = {"fcl": "FCL", "mujoco": "MuJoCo"}
 
 # The exact value is computed to this fraction of the difference of the two sides. This suffices to say which is nearer.
 RESOLUTION = 1e-3
@@ -58,19 +64,73 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """FCL's answer for a pair, beside ours.
+    """Another program's answer for a pair, beside ours. `by` names the program.
 
-    `fcl` is None if FCL gave no answer. `exact` = (lower, upper), in m, bounds the exact signed distance. It is
-    computed unless the two sides agree at once. `nearer` is the side nearer to the exact value in a disagreement; None
-    if `exact` does not decide. `explanation` is one sentence.
+    `theirs` is None if the program gave no answer. `exact` = (lower, upper), in m, bounds the exact signed distance. It
+    is computed unless the two sides agree at once. It is None for ellipsoids, whose exact distance is not known.
+    `nearer` is the side nearer to the exact value in a disagreement; None if `exact` does not decide. `explanation` is
+    one sentence.
     """
 
     verdict: Literal["agree", "disagree", "crashed", "unsupported"]
     ours: Figures
-    fcl: Figures | None
+    theirs: Figures | None
     explanation: str
-    nearer: Literal["ours", "fcl"] | None = None
+    nearer: Literal["ours", "fcl", "mujoco"] | None = None
     exact: tuple[float, float] | None = None
+    by: By = "fcl"
+
+
+class ContactLike(Protocol):
+    """A contact of a simulation."""
+
+    @property
+    def overlap(self) -> Overlap: ...
+
+
+class Reference(Protocol):
+    """A program that is asked about the contacts of a simulation."""
+
+    by: By
+
+    def compare_contacts(self, bodies: Any, contacts: Sequence[ContactLike]) -> list[Comparison]:
+        """The program's answers for the contacts of `bodies` at their last update."""
+
+    def close(self) -> None:
+        """End what the program needs."""
+
+
+def reference(check: By | None) -> Reference | None:
+    """The program with this name, or None for None. ValueError for another name. ImportError without FCL."""
+    if check is None:
+        return None
+    if check not in NAMES:
+        raise ValueError(f"check must be 'fcl', 'mujoco' or None, not {check!r}")
+    return Fcl() if check == "fcl" else Mujoco()
+
+
+class Mujoco:
+    """Checks overlaps of a MuJoCo simulation with MuJoCo's own contacts and distances.
+
+    A pair overlaps by MuJoCo if one of its contacts has a negative `dist`. If MuJoCo does not test the pair for
+    contacts, the sign of the distance decides. The distance, or minus the depth, is that of `mj_geomDistance`.
+    """
+
+    by: By = "mujoco"
+
+    def compare_contacts(self, bodies: Any, contacts: Sequence[ContactLike]) -> list[Comparison]:
+        """MuJoCo's answers for the contacts of `bodies` at their last update.
+
+        ValueError if `bodies` are not those of MuJoCo.
+        """
+        if not hasattr(bodies, "own_distances"):
+            raise ValueError("check='mujoco' needs a simulation of MuJoCo, but another simulator runs this one")
+        overlapping, distances = bodies.own_distances(contacts)
+        theirs = map(Figures, overlapping.tolist(), distances.tolist())
+        return [_judged(contact.overlap, each, None, self.by) for contact, each in zip(contacts, theirs)]
+
+    def close(self) -> None:
+        return
 
 
 class Fcl:
@@ -79,6 +139,8 @@ class Fcl:
     A pair that ends the process, or takes longer than `time_limit` seconds, gets the verdict "crashed". The process is
     then started again for the next pair. ImportError without python-fcl.
     """
+
+    by: By = "fcl"
 
     def __init__(self, time_limit: float = 10.0) -> None:
         if fcl is None:
@@ -104,13 +166,19 @@ class Fcl:
         """Asks FCL about the two shapes of `overlap`, in the same poses."""
         return self.compare_many([overlap])[0]
 
+    def compare_contacts(self, bodies: Any, contacts: Sequence[ContactLike]) -> list[Comparison]:
+        """As `compare_many`, for the contacts of a simulation."""
+        return self.compare_many(contact.overlap for contact in contacts)
+
     def compare_many(self, overlaps: Iterable[Overlap]) -> list[Comparison]:
         """As `compare`, for many pairs in one exchange with the process. If a pair ends it, other pairs get answers."""
         overlaps = list(overlaps)
         reasons = [_unsupported(overlap) for overlap in overlaps]
         answers = iter(self._ask([_request(overlap) for overlap, reason in zip(overlaps, reasons) if not reason]))
         return [
-            Comparison("unsupported", _ours(overlap), None, reason) if reason else _judged(overlap, *next(answers))
+            Comparison("unsupported", _ours(overlap), None, reason)
+            if reason
+            else _judged(overlap, *next(answers), self.by)
             for overlap, reason in zip(overlaps, reasons)
         ]
 
@@ -196,27 +264,32 @@ def _ours(overlap: Overlap) -> Figures:
     return Figures(bool(overlap), -overlap.depth if overlap else overlap.distance)
 
 
-def _judged(overlap: Overlap, theirs: Figures | None, end: str | None) -> Comparison:
-    ours = _ours(overlap)
+def _judged(overlap: Overlap, theirs: Figures | None, end: str | None, by: By) -> Comparison:
+    ours, name = _ours(overlap), NAMES[by]
     difference = 0.0 if theirs is None else _difference(ours, theirs)
-    claims = f"Signed distance by FCL {theirs}, by us {ours}"
-    if theirs is not None and end is None and theirs.overlapping == ours.overlapping and difference <= FCL_TOLERANCE:
-        return Comparison("agree", ours, theirs, f"{claims}.")
+    claims = f"Signed distance by {name} {theirs}, by us {ours}"
+    if theirs is not None and end is None and theirs.overlapping == ours.overlapping and difference <= TOLERANCE:
+        return Comparison("agree", ours, theirs, f"{claims}.", by=by)
     a, b = overlap.shapes
+    if isinstance(a.shape, Ellipsoid) or isinstance(b.shape, Ellipsoid):
+        words = f"{claims}: the exact distance of an ellipsoid is not known."
+        both = [each.signed_distance for each in (ours, theirs) if each is not None]
+        touching = all(each is not None and abs(each) <= TOLERANCE for each in both)
+        return Comparison("agree" if touching else "disagree", ours, theirs, words, by=by)
     assert overlap.normal is not None
     exact = signed_distance_bounds(a, b, [-overlap.normal], RESOLUTION * difference)
     truth = f"exactly {sum(exact) / 2:.9g} m ± {(exact[1] - exact[0]) / 2:.1g}"
     if theirs is None or end is not None:
         asked = "whether they overlap" if theirs is None else "for the signed distance"
-        return Comparison("crashed", ours, theirs, f"FCL {end} when asked {asked}: by us {ours}, {truth}.", None, exact)
-    if difference <= FCL_TOLERANCE and max(map(abs, exact)) <= FCL_TOLERANCE:
-        words = f"{claims}, {truth}: touching within FCL's tolerance of {FCL_TOLERANCE:g} m."
-        return Comparison("agree", ours, theirs, words, None, exact)
-    nearer = _nearer(ours, theirs, exact)
-    words = {"ours": "so ours is nearer", "fcl": "so FCL is nearer", None: "which does not decide which is nearer"}[
-        nearer
-    ]
-    return Comparison("disagree", ours, theirs, f"{claims}, {truth}, {words}.", nearer, exact)
+        return Comparison(
+            "crashed", ours, theirs, f"{name} {end} when asked {asked}: by us {ours}, {truth}.", None, exact, by
+        )
+    if difference <= TOLERANCE and max(map(abs, exact)) <= TOLERANCE:
+        words = f"{claims}, {truth}: touching within {name}'s tolerance of {TOLERANCE:g} m."
+        return Comparison("agree", ours, theirs, words, None, exact, by)
+    nearer = _nearer(ours, theirs, exact, by)
+    end = f"so {'ours' if nearer == 'ours' else name} is nearer" if nearer else "which does not decide which is nearer"
+    return Comparison("disagree", ours, theirs, f"{claims}, {truth}, {end}.", nearer, exact, by)
 
 
 def _difference(ours: Figures, theirs: Figures) -> float:
@@ -226,13 +299,15 @@ def _difference(ours: Figures, theirs: Figures) -> float:
     return abs(ours.signed_distance - theirs.signed_distance)
 
 
-def _nearer(ours: Figures, theirs: Figures, exact: tuple[float, float]) -> Literal["ours", "fcl"] | None:
+def _nearer(
+    ours: Figures, theirs: Figures, exact: tuple[float, float], by: By
+) -> Literal["ours", "fcl", "mujoco"] | None:
     """The side that is nearer to every value within `exact`: by signed distance if these differ, else by yes or no."""
     lower, upper = exact
     threshold, ours_is_below = 0.0, ours.overlapping
     mine, other = ours.signed_distance, theirs.signed_distance
-    if mine is not None and other is not None and abs(mine - other) > FCL_TOLERANCE:
+    if mine is not None and other is not None and abs(mine - other) > TOLERANCE:
         threshold, ours_is_below = (mine + other) / 2, mine < other
     if lower <= threshold <= upper:
         return None
-    return "ours" if ours_is_below == (upper < threshold) else "fcl"
+    return "ours" if ours_is_below == (upper < threshold) else by

@@ -26,7 +26,8 @@ OutOption = Annotated[
 HtmlOption = Annotated[Path | None, typer.Option(help="Write a recording as one HTML file, to open in a browser.")]
 
 CheckOption = Annotated[
-    Literal["fcl"] | None, typer.Option(help="Compare every pair with FCL, and explain differences.")
+    Literal["fcl", "mujoco"] | None,
+    typer.Option(help="Compare every pair with FCL or, in MuJoCo, with MuJoCo's own answer, and explain differences."),
 ]
 
 ToleranceOption = Annotated[
@@ -172,12 +173,12 @@ def asking(method: MethodOption = "auto", tolerance: ToleranceOption = 1e-3, pai
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The files that a run writes, whether rows are of shapes or of links, and whether FCL is asked, too."""
+    """The files that a run writes, whether rows are of shapes or of links, and which program is asked, too."""
 
     out: Path | None
     html: Path | None
     per: Literal["shape", "link"]
-    check: Literal["fcl"] | None
+    check: Literal["fcl", "mujoco"] | None
 
 
 def files(

@@ -100,14 +100,17 @@ def _measure(
     """
     with quiet() as noise, scene_refusals(noise), ExitStack() as stack:
         import_engine(name)
-        from overlapper.reference import Fcl
+        from overlapper.reference import reference
         from overlapper.scenes.run import run as frames_of
         from overlapper.tables.outputs import outputs
         from overlapper.tables.summary import Summary
         from overlapper.tables.table_file import origin
 
         scene = load_scene(name, simulated.parameters)
-        fcl = stack.enter_context(Fcl()) if files.check else None
+        if files.check == "mujoco" and scene.engine != "mujoco":
+            raise Refused(f"--check mujoco needs a simulation of MuJoCo, but {scene.engine} runs {scene.path}")
+        if check := reference(files.check):
+            stack.callback(check.close)
         steps, contact = simulated.steps or scene.steps, simulated.contact or scene.contact
         settings = {"scene": scene.name, "steps": steps, **settings_of(asked, modelled), "contact": contact}
         summary = Summary(scene.name)
@@ -119,7 +122,7 @@ def _measure(
                 files.out,
                 files.html,
                 files.per,
-                fcl,
+                check,
                 contact == "volumetric",
             )
         )

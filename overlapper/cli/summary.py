@@ -10,6 +10,7 @@ from rich.text import Text
 
 from overlapper.cli.figures import ROUNDED_UP, VOLUME_UNITS, plain_table, volume_unit
 from overlapper.printable import printable
+from overlapper.reference import NAMES
 from overlapper.simulation import Decomposed, Skipped
 from overlapper.tables.summary import Summary
 
@@ -55,7 +56,9 @@ def remarks(summary: Summary, limit: int = 10) -> list[str]:
     lines += [_decomposed(each) for each in summary.decomposed]
     if summary.verdicts:
         counts = ", ".join(f"{count:,} {verdict}" for verdict, count in summary.verdicts.most_common())
-        lines.append(f"FCL on {sum(summary.verdicts.values()):,} pairs that overlap or touch: {counts}.")
+        lines.append(
+            f"{NAMES[summary.check]} on {sum(summary.verdicts.values()):,} pairs that overlap or touch: {counts}."
+        )
     for each in summary.disagreements[:limit]:
         lines.append(f"  step {each.step}, {' – '.join(each.names)}, {each.verdict}: {each.explanation}")
     if len(summary.disagreements) > limit:

@@ -86,7 +86,7 @@ def watch(
     how = {"every": every, "rate": rate, **settings_of(asked, modelled), "per": files.per, "check": files.check}
     how["names"] = _named(names or ())
     try:
-        from overlapper.reference import Fcl
+        from overlapper.reference import reference
         from overlapper.scenes.watching import Watches
         from overlapper.simulation.engine import LIBRARIES, engine
         from overlapper.simulation.imports import when_imported
@@ -95,8 +95,8 @@ def watch(
             engine("bullet")  # says what to install
         from overlapper.tables.outputs import can_be_written
 
-        if files.check:
-            Fcl().close()
+        if check := reference(files.check):
+            check.close()
         can_be_written(files.out, files.html)
     except ImportError as error:
         raise Refused(str(error)) from error

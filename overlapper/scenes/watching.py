@@ -14,9 +14,9 @@ from functools import partial
 from mmap import mmap
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
-from overlapper.reference import Fcl
+from overlapper.reference import By, reference
 from overlapper.scenes.other_processes import OtherProcesses
 from overlapper.simulation.asked_pairs import Among
 from overlapper.simulation.bodies import AnyBodies
@@ -82,8 +82,8 @@ class Watch:
         Method of computation, as in `overlapper.overlap`.
     per : {'shape', 'link'}, default 'shape'
         A row of the table is a pair of shapes, or a pair of whole links.
-    check : {'fcl'}, optional
-        Compare every pair with FCL.
+    check : {'fcl', 'mujoco'}, optional
+        Compare every pair with FCL, or with the answer of MuJoCo itself, if MuJoCo runs the simulation.
     recorder : Recorder, optional
         A recorder that was set up earlier.
     names : dict of int to str, optional
@@ -118,7 +118,7 @@ class Watch:
         tolerance: float = 1e-3,
         method: Method = "auto",
         per: Per = "shape",
-        check: Literal["fcl"] | None = None,
+        check: By | None = None,
         recorder: Recorder | None = None,
         names: Mapping[int, str] | None = None,
         name: str = "the simulation",
@@ -129,8 +129,6 @@ class Watch:
             raise ValueError(f"every must be a number of steps from 1, not {every}")
         if not 0 < rate < math.inf:
             raise ValueError(f"rate must be a number of measurements a second above 0, not {rate!r}")
-        if check not in (None, "fcl"):
-            raise ValueError(f"check must be 'fcl' or None, not {check!r}")
         if per not in get_args(Per):
             raise ValueError(f"per must be 'shape' or 'link', not {per!r}")
         self._modelling = Modelling(concave, concave_threshold, surface)
@@ -150,7 +148,7 @@ class Watch:
         """The files that were written, known when the watch is over."""
         self.open = True
         self._names = names
-        self._fcl = Fcl() if check else None
+        self._check = reference(check)
         self._simulation = of_engine.running(physicsClientId, recorder)
         self._bodies: AnyBodies | None = None
         self._files = ExitStack()
@@ -238,7 +236,7 @@ class Watch:
         """The function that takes the frames. It creates the files."""
         watched = {"simulation": self.summary.scene, "every": self.every}
         settings = origin(bodies.engine) | watched | settings_of(self._asking) | bodies.settings
-        files = outputs(self.summary, settings, self.written, self.out, self.html, self._per, self._fcl)
+        files = outputs(self.summary, settings, self.written, self.out, self.html, self._per, self._check)
         return self._files.enter_context(files)
 
     @property
@@ -271,8 +269,8 @@ class Watch:
         self._simulation.leave()
         if self._bodies:
             self._bodies.close()
-        if self._fcl:
-            self._fcl.close()
+        if self._check:
+            self._check.close()
 
     def __enter__(self) -> Watch:
         return self

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Literal
 from overlapper import Overlaps
 from overlapper.simulation.links import link_contacts
 from overlapper.tables.summary import Summary
-from overlapper.tables.table import COLUMNS, FORCES, link_rows, rows
+from overlapper.tables.table import COLUMNS, FORCES, MUJOCO, link_rows, rows
 from overlapper.tables.table_file import LEFT_OUT, TABLES, must_be_a_table
 from overlapper.whole_file import must_be_writable, unfinished
 
 if TYPE_CHECKING:
-    from overlapper.reference import Comparison, Fcl
+    from overlapper.reference import By, Comparison, Reference
     from overlapper.simulation.bodies import AnyBodies
     from overlapper.simulation.contacts import Contacts
     from overlapper.simulation.forces.forces import Forces
@@ -50,18 +50,22 @@ class StepTable:
     """A table of overlaps that grows by the rows of each step. Its heading has the `settings`.
 
     `per` says whether a row is about two shapes or two links as a whole. `forces` says whether there are columns of
-    forces, too. ValueError for a name with an ending that is not in TABLES. OSError if the file cannot be made.
+    forces, too. `check` names the program that is asked about each pair. ValueError for a name with an ending that is
+    not in TABLES. OSError if the file cannot be made.
     ImportError without the library that writes it.
     """
 
-    def __init__(self, path: Path, settings: Mapping[str, Any], per: Per = "shape", forces: bool = False) -> None:
+    def __init__(
+        self, path: Path, settings: Mapping[str, Any], per: Per = "shape", forces: bool = False, check: By | None = None
+    ) -> None:
         must_be_a_table(path)
         if per not in ("shape", "link"):
             raise ValueError(f"per must be 'shape' or 'link', not {per!r}")
         self.path, self._per = path, per
         self._left_out: dict[Skipped, int] = {}
         texts = {name: str(value) for name, value in settings.items()}
-        self._table = TABLES[path.suffix](path, texts | {"per": per}, COLUMNS | FORCES if forces else COLUMNS)
+        columns = COLUMNS | (MUJOCO if check == "mujoco" else {}) | (FORCES if forces else {})
+        self._table = TABLES[path.suffix](path, texts | {"per": per}, columns)
 
     def add(
         self,
@@ -74,8 +78,8 @@ class StepTable:
     ) -> None:
         """Write the rows of a step at once.
 
-        `opinions` are FCL's of the same contacts, if it was asked. A body or link that is left out for the first time
-        is metadata from then on.
+        `opinions` are those of FCL or MuJoCo on the same contacts, if it was asked. A body or link that is left out for
+        the first time is metadata from then on.
         """
         for each in bodies.skipped:
             if each not in self._left_out:
@@ -107,7 +111,7 @@ def outputs(
     out: Path | None = None,
     html: Path | None = None,
     per: Per = "shape",
-    fcl: Fcl | None = None,
+    check: Reference | None = None,
     forces: bool = False,
 ) -> Iterator[Callable[[Frame[Any]], None]]:
     """Give a function that takes frames, and writes them to the summary, the table `out` and the page `html`.
@@ -117,13 +121,15 @@ def outputs(
     """
     for path in filter(None, (out, html)):
         path.parent.mkdir(parents=True, exist_ok=True)
+    if check:
+        summary.check = check.by
     with ExitStack() as stack:
         # The page is written last, and checked first.
         record = stack.enter_context(recorder(html, written)) if html else None
-        table = stack.enter_context(_table(out, settings, per, forces, written)) if out else None
+        table = stack.enter_context(_table(out, settings, per, forces, check, written)) if out else None
 
         def take(frame: Frame[Any]) -> None:
-            opinions = fcl.compare_many(contact.overlap for contact in frame.contacts) if fcl else []
+            opinions = check.compare_contacts(frame.bodies, frame.contacts) if check else []
             if table:
                 table.add(frame.step, frame.time, frame.bodies, frame.contacts, opinions, frame.forces)
             summary.add(frame, opinions)
@@ -134,12 +140,14 @@ def outputs(
 
 
 @contextmanager
-def _table(path: Path, settings: Mapping[str, Any], per: Per, forces: bool, written: list[Path]) -> Iterator[StepTable]:
+def _table(
+    path: Path, settings: Mapping[str, Any], per: Per, forces: bool, check: Reference | None, written: list[Path]
+) -> Iterator[StepTable]:
     """Give a table to be written.
 
     It is named in `written` if it has rows, or if the run came to its end.
     """
-    table = StepTable(path, settings, per, forces)
+    table = StepTable(path, settings, per, forces, check.by if check else None)
     try:
         yield table
     except BaseException as error:

@@ -1,4 +1,4 @@
-"""The summary of a run: the figures of each pair of links, the answers of FCL, and what was not modelled."""
+"""The summary of a run: the figures of each pair of links, the answers of FCL or MuJoCo, and what was not modelled."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from overlapper.simulation.links import LinkContact, link_contacts
 
 if TYPE_CHECKING:
-    from overlapper.reference import Comparison
+    from overlapper.reference import By, Comparison
     from overlapper.simulation import Decomposed, Report, Skipped
     from overlapper.simulation.bodies import AnyBodies
     from overlapper.tables.frame import Frame
@@ -102,7 +102,7 @@ def note_skipped(known: dict[Skipped, int], frame: Frame[AnyBodies] | Frame[Stil
 
 @dataclass(frozen=True, slots=True)
 class Disagreement:
-    """A contact where FCL and this package differ, or where FCL gave no answer. `explanation` is one sentence."""
+    """A contact where another program differs from this package, or gave no answer. `explanation` is one sentence."""
 
     step: int
     names: tuple[str, str]
@@ -131,11 +131,13 @@ class Summary:
     decomposed : list of Decomposed
         The concave meshes at the end.
     verdicts : Counter of str
-        Numbers of verdicts of FCL, if FCL was asked.
+        Numbers of verdicts of FCL or MuJoCo, if it was asked.
     disagreements : list of Disagreement
-        The contacts where FCL differs.
+        The contacts where FCL or MuJoCo differs.
     forces : bool, default False
         Whether there were forces of volumetric contact.
+    check : {'fcl', 'mujoco'}, default 'fcl'
+        The program whose verdicts these are.
     """
 
     scene: str
@@ -148,6 +150,7 @@ class Summary:
     verdicts: Counter[str] = field(default_factory=Counter)
     disagreements: list[Disagreement] = field(default_factory=list)
     forces: bool = False
+    check: By = "fcl"
 
     def add(self, frame: Frame[AnyBodies], opinions: Sequence[Comparison] = ()) -> None:
         """Add a frame.
@@ -157,7 +160,7 @@ class Summary:
         frame : Frame
             Bodies and contacts of a step.
         opinions : sequence of Comparison, default ()
-            Comparisons of its contacts with FCL, if FCL was asked.
+            Comparisons of its contacts with FCL or MuJoCo, if it was asked.
         """
         self.steps, self.seconds = frame.step, frame.time
         self.report = _sum(self.report, frame.bodies.report())
@@ -221,7 +224,7 @@ class Summary:
                 asdict(each) | {"shapes": [*each.shapes], "path": str(each.path) if each.path else None}
                 for each in self.decomposed
             ],
-            "fcl": dict(self.verdicts),
+            self.check: dict(self.verdicts),
             "disagreements": [asdict(each) for each in self.disagreements],
         }
 

@@ -39,6 +39,9 @@ COLUMNS: dict[str, type] = {
     "fcl_explanation": str,
 }
 
+# The further columns of a run that is compared with MuJoCo.
+MUJOCO: dict[str, type] = {"mujoco": str, "mujoco_explanation": str}
+
 # The further columns of a run with volumetric contact. They are empty for a pair that it does not push apart.
 FORCES: dict[str, type] = dict.fromkeys(FORCE_COLUMNS, float)
 
@@ -105,7 +108,7 @@ def rows(
 ) -> list[Row]:
     """Return the rows of one step.
 
-    `opinions` are FCL's of the same contacts, if it was asked. `forces` are the forces between them.
+    `opinions` are those of FCL or MuJoCo on the same contacts, if it was asked. `forces` are the forces between them.
     """
     pushed = _pushed(forces)
     a, b = placements(bodies, "A"), placements(bodies, "B")
@@ -119,12 +122,17 @@ def rows(
                 **b[contact.bodyB, contact.linkB, contact.shapeB],
                 "status": contact.overlap.status,
                 **measures_of(contact.overlap),
-                "fcl": opinions[k].verdict if opinions else None,
-                "fcl_explanation": opinions[k].explanation if opinions else None,
+                "fcl": None,
+                "fcl_explanation": None,
+                **(_opinion(opinions[k]) if opinions else {}),
                 **pushed.get(_key(contact), {}),
             }
         )
     return table
+
+
+def _opinion(opinion: Comparison) -> Row:
+    return {opinion.by: opinion.verdict, f"{opinion.by}_explanation": opinion.explanation}
 
 
 def _key(contact: Contact) -> tuple[int, ...]:
@@ -144,8 +152,8 @@ def link_rows(
 ) -> list[Row]:
     """Return the rows of one step for links as a whole.
 
-    The columns of single shapes, their poses, area, slip and FCL, are empty. Forces and energies are sums over the
-    pairs of their shapes. Torques are sums about the centroid of the links.
+    The columns of single shapes, their poses, area, slip, FCL and MuJoCo, are empty. Forces and energies are sums over
+    the pairs of their shapes. Torques are sums about the centroid of the links.
     """
     names = bodies.names
     at = {} if forces is None else {pair: k for k, pair in enumerate(map(tuple, forces.pairs.tolist()))}

@@ -324,6 +324,7 @@ def test_a_broken_scene_is_refused_with_what_pybullet_said_of_it(tmp_path):
         (["--steps", "many"], "'--steps'"),
         (["--method", "guess"], "'auto', 'paper'"),
         (["--check", "gut"], "'fcl'"),
+        (["--check", "mujoco"], "--check mujoco needs a simulation of MuJoCo, but bullet runs"),
         (["--tolerance", "0"], "--tolerance must lie between 0 and 1, not 0.0"),
         (["--tolerance", "nan"], "--tolerance must lie between 0 and 1, not nan"),
         (["--out", "two.txt"], "--out must end in .csv, .parquet, .sqlite, not 'two.txt'"),

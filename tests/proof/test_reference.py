@@ -13,7 +13,7 @@ import pytest
 from strategies import hull_points, moved, quaternion
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap, reference
-from overlapper.reference import FCL_TOLERANCE, Fcl
+from overlapper.reference import TOLERANCE, Fcl
 
 CUBE = Box([0.5, 0.5, 0.5])
 
@@ -62,7 +62,7 @@ def test_fcl_agrees_or_is_wrong(fcl, kinds):
         if comparison.verdict == "disagree":
             assert comparison.nearer == "ours", comparison.explanation
             assert comparison.ours.signed_distance > 0.0 and {"sphere", "capsule", "cylinder"} & set(kinds)
-            assert 0.0 < comparison.fcl.signed_distance - comparison.ours.signed_distance < 1e-3
+            assert 0.0 < comparison.theirs.signed_distance - comparison.ours.signed_distance < 1e-3
         else:
             assert comparison.verdict == "agree", comparison.explanation
     assert any(comparison.verdict == "agree" for comparison in comparisons)
@@ -74,22 +74,22 @@ def test_depths_agree_within_the_tolerance_of_fcl(fcl, kinds):
     bodies = [Placed(KINDS[kind](rng), (0.1 * i, 0.05, 0.0), quaternion(rng)) for i, kind in enumerate(kinds)]
     comparison = fcl.compare(overlap(*bodies))
     assert comparison.verdict == "agree", comparison.explanation
-    assert comparison.ours.overlapping and comparison.fcl.overlapping
-    assert abs(comparison.ours.signed_distance - comparison.fcl.signed_distance) <= FCL_TOLERANCE
+    assert comparison.ours.overlapping and comparison.theirs.overlapping
+    assert abs(comparison.ours.signed_distance - comparison.theirs.signed_distance) <= TOLERANCE
 
 
 def test_a_half_space_has_a_depth_but_no_distance_in_fcl(fcl):
     floor = Placed(HalfSpace((0, 0, 1), 0.2))
     deep, apart = fcl.compare_many(overlap(Placed(CUBE, (0, 0, z)), floor) for z in (0.5, 3.0))
-    assert deep.fcl.overlapping and deep.fcl.signed_distance == pytest.approx(-0.2, abs=1e-15)
-    assert not apart.fcl.overlapping and apart.fcl.signed_distance is None
+    assert deep.theirs.overlapping and deep.theirs.signed_distance == pytest.approx(-0.2, abs=1e-15)
+    assert not apart.theirs.overlapping and apart.theirs.signed_distance is None
     assert (deep.verdict, apart.verdict) == ("agree", "agree")
 
 
 def test_a_pair_that_ends_the_process_is_reported_and_the_next_is_answered(fcl):
     crashed = fcl.compare(overlap(*KILLER))
     assert crashed.verdict == "crashed"
-    assert crashed.fcl.overlapping and crashed.fcl.signed_distance is None
+    assert crashed.theirs.overlapping and crashed.theirs.signed_distance is None
     assert "SIGABRT" in crashed.explanation and "origin is outside of the polytope" in crashed.explanation
     assert max(map(abs, crashed.exact)) < 1e-15
     assert fcl.compare(overlap(Placed(CUBE), Placed(CUBE, (0.75, 0, 0)))).verdict == "agree"
@@ -100,7 +100,7 @@ def test_a_crash_in_a_batch_costs_only_its_own_pair(fcl):
     pairs = [KILLER if gap is None else (Placed(CUBE), Placed(CUBE, (1.0 + gap, 0, 0))) for gap in gaps]
     comparisons = fcl.compare_many(overlap(*pair) for pair in pairs)
     assert [c.verdict for c in comparisons] == ["crashed" if gap is None else "agree" for gap in gaps]
-    assert [c.fcl.signed_distance for c in comparisons] == [gap and pytest.approx(gap, abs=1e-9) for gap in gaps]
+    assert [c.theirs.signed_distance for c in comparisons] == [gap and pytest.approx(gap, abs=1e-9) for gap in gaps]
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="a process cannot be stopped on this system")
@@ -110,7 +110,7 @@ def test_a_process_that_hangs_is_given_up_after_the_time_limit():
         assert fcl.compare(cubes).verdict == "agree"
         os.kill(fcl._worker.process.pid, signal.SIGSTOP)
         stopped = fcl.compare(cubes)
-        assert stopped.verdict == "crashed" and stopped.fcl is None
+        assert stopped.verdict == "crashed" and stopped.theirs is None
         assert "no answer within 0.2 s" in stopped.explanation
         assert fcl.compare(cubes).verdict == "agree"
 
@@ -159,7 +159,7 @@ def test_cubes_of_a_tenth_of_a_millimetre_that_fcl_calls_apart_are_decided_for_u
     pairs = [(moved(cube, orientation=q), moved(moved(cube, shift), orientation=q)) for shift, q in zip(shifts, turns)]
     comparisons = fcl.compare_many(overlap(*pair) for pair in pairs)
     assert all(c.ours.signed_distance == pytest.approx(-1e-5, rel=1e-9) for c in comparisons)
-    lost = [c for c in comparisons if c.fcl.signed_distance > 0.0]
+    lost = [c for c in comparisons if c.theirs.signed_distance > 0.0]
     assert len(lost) > 0
     for comparison in lost:
         assert (comparison.verdict, comparison.nearer) == ("disagree", "ours")
@@ -169,7 +169,7 @@ def test_cubes_of_a_tenth_of_a_millimetre_that_fcl_calls_apart_are_decided_for_u
 def test_touching_cubes_agree_and_the_sentence_says_why(fcl):
     touching = fcl.compare(overlap(Placed(CUBE), Placed(CUBE, (1.0, 0.3, 0.2))))
     assert touching.verdict == "agree"
-    assert touching.fcl.overlapping and not touching.ours.overlapping
+    assert touching.theirs.overlapping and not touching.ours.overlapping
     assert "touching" in touching.explanation and touching.exact[0] <= 0.0 <= touching.exact[1]
 
 
@@ -188,7 +188,7 @@ def test_a_wrong_claim_of_ours_loses(fcl, claimed, winner):
 def test_a_wrong_yes_beside_a_half_space_loses_without_a_distance(fcl):
     ball, floor = Placed(Sphere(0.5), (0, 0, 0.6)), Placed(HalfSpace((0, 0, 1), 0.0))
     comparison = fcl.compare(Claim(ball, floor, -0.1, (0, 0, 1)))
-    assert (comparison.verdict, comparison.nearer, comparison.fcl.signed_distance) == ("disagree", "fcl", None)
+    assert (comparison.verdict, comparison.nearer, comparison.theirs.signed_distance) == ("disagree", "fcl", None)
 
 
 def test_pairs_that_fcl_cannot_answer_are_unsupported(fcl):

@@ -109,6 +109,13 @@ def test_only_an_error_keeps_the_table_from_its_place(pile, error, place):
     assert watch.written == [Path(place)] == list(Path().iterdir())
 
 
+def test_mujoco_is_not_asked_about_a_simulation_of_pybullet(pile):
+    watch = overlapper.watch(pile, check="mujoco")
+    with pytest.raises(ValueError, match="check='mujoco' needs a simulation of MuJoCo, but another simulator runs"):
+        p.stepSimulation(pile)
+    assert not watch.open
+
+
 def test_a_missing_body_raises_in_the_call_of_the_step(pile):
     watch = overlapper.watch(pile, pairs=[(0, 7)])
     with pytest.raises(ValueError, match="pairs names body 7, which is not in the simulation"):
@@ -123,7 +130,7 @@ def test_a_missing_body_raises_in_the_call_of_the_step(pile):
     [
         ({"every": 0}, ValueError, "every must be a number of steps from 1, not 0"),
         ({"rate": 0}, ValueError, "rate must be a number of measurements a second above 0, not 0"),
-        ({"check": "gut"}, ValueError, "check must be 'fcl' or None, not 'gut'"),
+        ({"check": "gut"}, ValueError, "check must be 'fcl', 'mujoco' or None, not 'gut'"),
         ({"per": "body"}, ValueError, "per must be 'shape' or 'link', not 'body'"),
         ({"surface": "rough"}, ValueError, "surface must be"),
         ({"out": "own.txt"}, ValueError, "the name of a table must end in .csv, .parquet, .sqlite, not 'own.txt'"),

@@ -1,5 +1,6 @@
 """The geoms of MuJoCo models: shapes, poses, pairs, scenes, logs and watches."""
 
+import json
 import subprocess
 import sys
 from contextlib import closing
@@ -19,7 +20,8 @@ from overlapper.tables.table_file import read_metadata, read_table
 
 mujoco = pytest.importorskip("mujoco")
 
-from overlapper.mujoco import Bodies, GeomContact, link_contacts  # noqa: E402
+from overlapper.mujoco import Bodies, GeomContact, VolumetricContact, link_contacts  # noqa: E402
+from overlapper.reference import Mujoco  # noqa: E402
 
 ROBOT = """
 <mujoco model="robot">
@@ -350,6 +352,79 @@ def test_mujoco_is_needed_by_name_and_pybullet_is_not():
 # ---------------------------------------------------------------------------------------------- scenes, logs, watches
 
 
+# ------------------------------------------------------------------------------------------------ MuJoCo's own answers
+
+CAPSULE_IN_BOX = """<mujoco><worldbody><geom name="box" type="box" size=".2 .3 .4"/>
+<body pos=".02 0 0" quat="1 .3 .2 0"><freejoint/><geom name="capsule" type="capsule" size=".05 .1"/></body>
+</worldbody></mujoco>"""
+
+
+def opinions(model, data, **chosen):
+    bodies = Bodies(model, data)
+    return Mujoco().compare_contacts(bodies, bodies.overlaps(**chosen))
+
+
+@pytest.mark.parametrize("kinds", [("plane", "mesh"), ("sphere", "box"), ("box", "mesh"), ("capsule", "capsule")])
+def test_mujoco_agrees_where_its_distances_are_exact(kinds):
+    found = [each for seed in range(8) for each in opinions(*two(kinds, seed))]
+    assert {each.verdict for each in found} == {"agree"} and all(each.by == "mujoco" for each in found)
+
+
+def test_a_capsule_in_a_box_is_too_shallow_in_mujoco():
+    (told,) = opinions(*simulated(CAPSULE_IN_BOX))
+    assert (told.verdict, told.nearer) == ("disagree", "ours")
+    assert told.theirs.signed_distance == pytest.approx(-0.23460177) and told.theirs.overlapping
+    assert told.exact == pytest.approx((told.ours.signed_distance,) * 2, abs=1e-12)
+    assert told.explanation.startswith("Signed distance by MuJoCo -0.234601") and "so ours is" in told.explanation
+
+
+def test_what_mujoco_says_of_ellipsoids_is_not_decided():
+    balls = """<mujoco><worldbody><geom type="ellipsoid" size=".03 .04 .06"/><body pos="{} 0 0"><freejoint/>
+    <geom size=".03"/></body></worldbody></mujoco>"""
+    (deep,) = opinions(*simulated(balls.format(0.02)))
+    assert (deep.verdict, deep.nearer, deep.exact) == ("disagree", None, None)
+    assert deep.explanation.endswith("by us -0.04 m (overlapping): the exact distance of an ellipsoid is not known.")
+    (shallow,) = opinions(*simulated(balls.format(0.06 - 1e-8)))
+    assert shallow.verdict == "agree"
+
+
+def test_a_contact_that_mujoco_misses_is_a_disagreement():
+    """MuJoCo tests an edited geom with its old bounding box until mj_setConst is called."""
+    model, data = simulated(ROBOT.replace('pos="0 0 .1"', 'pos="0 0 2"'))
+    model.geom_size[1, 0] = 2.5
+    mujoco.mj_forward(model, data)
+    told = opinions(model, data, pairs=[("world/floor", "torso/ball")])
+    assert [(each.verdict, each.nearer) for each in told] == [("disagree", "ours")]
+    assert told[0].theirs.signed_distance == pytest.approx(-0.5) and not told[0].theirs.overlapping
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # then MuJoCo tests nothing
+    assert opinions(model, data, pairs="all")[0].verdict == "agree"
+
+
+def test_pairs_without_contacts_are_compared_by_their_distances():
+    model, data = simulated(ROBOT)
+    told = {each.verdict for each in opinions(model, data, pairs="all")}
+    assert len(Bodies(model, data).overlaps(pairs="all")) > len(data.contact) == 3 and told <= {"agree", "disagree"}
+    bodies = Bodies(model, data)
+    overlapping, distances = bodies.own_distances(bodies.overlaps(pairs="all"))
+    assert overlapping.all() and (distances < 0).all()
+    contacts = bodies.overlaps()
+    with VolumetricContact(bodies):
+        mujoco.mj_step(model, data)
+        assert len(data.contact) == 0 and bodies.own_distances(contacts)[0].all()
+
+
+def test_touching_geoms_agree():
+    model, data = simulated(ROBOT.replace('pos="0 0 .1"', 'pos="0 0 .11"').replace(".05 .1", ".01 .1"))
+    (ball, *_) = opinions(model, data)
+    assert ball.verdict == "agree" and abs(ball.theirs.signed_distance) < 1e-6
+    bodies = Bodies(model, data)
+    contacts = bodies.overlaps()
+    data.geom_xpos[1, 2] += 0.5
+    assert bodies.own_distances(contacts)[1][0] == pytest.approx(0.5)
+    empty = bodies.own_distances(contacts[:0])
+    assert [each.shape for each in empty] == [(0,), (0,)]
+
+
 @pytest.fixture
 def here(away):
     Path("robot.xml").write_text(ROBOT)
@@ -443,6 +518,28 @@ def test_a_script_is_watched_as_it_is():
     assert (done.returncode, done.stdout) == (0, alone.stdout), done.stderr
     assert alone.stdout.endswith(" False\n")
     assert [len({row["step"] for row in read_table(Path(name))}) for name in ("own.csv", "own-2.csv")] == [3, 3]
+
+
+@pytest.mark.usefixtures("here")
+def test_a_run_is_compared_with_mujoco():
+    Path("capsule.xml").write_text(CAPSULE_IN_BOX)
+    command = [sys.executable, "-m", "overlapper", "run", "capsule.xml", "--steps", "3", "--check", "mujoco"]
+    done = subprocess.run([*command, "--out", "own.csv", "--json"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["mujoco"] == {"disagree": 3} and "fcl" not in json.loads(done.stdout)
+    rows = read_table(Path("own.csv"))
+    assert [(row["mujoco"], row["fcl"]) for row in rows] == [("disagree", None)] * 3
+    assert "so ours is nearer." in rows[0]["mujoco_explanation"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert "MuJoCo on 3 pairs that overlap or touch: 3 disagree." in done.stdout
+    Path("own.py").write_text(
+        "import mujoco\nmodel = mujoco.MjModel.from_xml_path('capsule.xml')\ndata = mujoco.MjData(model)\n"
+        "for _ in range(3): mujoco.mj_step(model, data)\n"
+    )
+    command = [sys.executable, "-m", "overlapper", "watch", "--out", "watched.csv", "--check", "mujoco", "own.py"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0 and "MuJoCo on 3 pairs that overlap or touch: 3 disagree." in done.stderr
+    assert read_table(Path("watched.csv")) == rows
 
 
 def test_work_waits_until_a_library_is_imported(monkeypatch, tmp_path):

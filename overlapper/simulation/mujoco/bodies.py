@@ -6,9 +6,13 @@ import warnings
 from collections.abc import Mapping
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.cautions import UnknownBodyWarning
+from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.mujoco.distances import own_distances
 from overlapper.simulation.mujoco.source import MujocoSource
 from overlapper.simulation.naming import named
 from overlapper.simulation.settings import Concave, Modelling, Surface
@@ -86,3 +90,36 @@ class Bodies(AnyBodies):
         if strange := sorted(given.keys() - self._source.bodies.keys()):
             told = ", ".join(f"{body}: {given[body]!r}" for body in strange)
             warnings.warn(f"names has bodies that are not in the simulation: {told}", UnknownBodyWarning, stacklevel=2)
+
+    def own_distances(self, contacts: Contacts) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+        """MuJoCo's own answers for contacts of this simulation, in the poses and the `data.contact` of now.
+
+        Parameters
+        ----------
+        contacts : Contacts
+            The n contacts, from `overlaps()`.
+
+        Returns
+        -------
+        overlapping : ndarray of bool, shape (n,)
+            Whether a contact of the pair in `data.contact` has a negative `dist`. If MuJoCo does not test the pair, the
+            sign of the distance decides.
+        distances : ndarray, shape (n,)
+            The distances of `mj_geomDistance`, m. They are negative for pairs that overlap.
+
+        Examples
+        --------
+        >>> import mujoco
+        >>> from overlapper.mujoco import Bodies
+        >>> model = mujoco.MjModel.from_xml_string('''<mujoco><worldbody>
+        ...   <geom type="plane" size="1 1 .1"/>
+        ...   <body pos="0 0 .04"><freejoint/><geom type="sphere" size=".05"/></body>
+        ... </worldbody></mujoco>''')
+        >>> data = mujoco.MjData(model)
+        >>> mujoco.mj_forward(model, data)
+        >>> bodies = Bodies(model, data)
+        >>> overlapping, distances = bodies.own_distances(bodies.overlaps())
+        >>> overlapping.tolist(), distances.round(9).tolist()
+        ([True], [-0.01])
+        """
+        return own_distances(self.model, self.data, contacts.keys[:, [1, 4]])
