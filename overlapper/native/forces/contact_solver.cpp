@@ -16,6 +16,9 @@ constexpr int kVisits = 10000;
 constexpr int kFewest = 10;
 constexpr int kMost = 2000;
 
+/// Wrenches are extrapolated from this sweep on.
+constexpr int kPlain = 8;
+
 /// The axis of a rotation times its angle in rad. NaN above a third of a turn, where rounding would matter.
 Vec3 rotation_vector(const Mat3& turn) {
   const Vec3 twice{turn.row2.y - turn.row1.z, turn.row0.z - turn.row2.x, turn.row1.x - turn.row0.y};
@@ -264,6 +267,34 @@ double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span
   return duration * std::max({std::abs(normal[0]), std::abs(along[0]), std::abs(along[1])});
 }
 
+/// Extrapolates the wrenches after a sweep there and back (Nesterov 1983). It begins anew when the sweeps go against
+/// the extrapolation (O'Donoghue and Candès 2015). The next visits replace the wrenches, so these need not obey the
+/// laws. Without it, patches of one body that cannot all stick need thousands of sweeps: each sweep adds the same small
+/// wrench to those by which the patches hold each other, until one of them slides.
+void ContactSolver::extrapolate(Momentum& momentum, std::span<Laws> laws, double duration,
+                                std::span<double> velocity) const {
+  auto& [before, begun, weight] = momentum;
+  double against = before.empty() ? 1 : 0;
+  for (size_t i = 0; i < before.size(); ++i)
+    for (int k = 0; k < 3; ++k) {
+      const Six &now = laws[i].wrench, &last = before[i], &from = begun[i];
+      against += rows_[i].normal_by_normal[k][k] * (from.normal[k] - now.normal[k]) * (now.normal[k] - last.normal[k]);
+      against += rows_[i].tangential_by_tangential[k][k] * (from.tangential[k] - now.tangential[k]) *
+                 (now.tangential[k] - last.tangential[k]);
+    }
+  before.resize(laws.size()), begun.resize(laws.size());
+  if (against > 0) weight = 1;
+  const double next = (1 + std::sqrt(1 + 4 * weight * weight)) / 2, factor = (weight - 1) / next;
+  weight = next;
+  for (size_t i = 0; i < laws.size(); ++i) {
+    Six& wrench = laws[i].wrench;
+    const Six more{factor * (wrench.normal - before[i].normal), factor * (wrench.tangential - before[i].tangential)};
+    push(rows_[i], more, duration, velocity);
+    before[i] = wrench;
+    begun[i] = wrench = {wrench.normal + more.normal, wrench.tangential + more.tangential};
+  }
+}
+
 ContactSolver::Solution ContactSolver::solve(const Step& step) {
   const double h = step.duration;
   const int count = int(rows_.size());
@@ -289,6 +320,7 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   }
   for (int i = 0; i < count; ++i) push(rows_[i], laws[i].wrench, h, velocity);
   int sweeps = 0;
+  Momentum momentum;
   for (const int most = std::clamp(kVisits / std::max(1, count), kFewest, kMost); sweeps < most && count > 0;) {
     // Sweeps go there and back, so that a push at one end of a stack soon reaches the other end.
     double changed = 0;
@@ -298,6 +330,8 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
     }
     ++sweeps;
     if (changed <= kSettled * largest) break;
+    const bool there_and_back = sweeps >= kPlain && sweeps % 2 == 0 && sweeps + 2 <= most;
+    if (there_and_back && step.friction == Friction::kEllipsoid) extrapolate(momentum, laws, h, velocity);
   }
   Solution solution = solved(laws, velocity);
   solution.sweeps = sweeps;

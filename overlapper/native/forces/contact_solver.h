@@ -104,6 +104,13 @@ class ContactSolver {
   /// The laws of a patch in a step, and its present wrench.
   struct Laws;
 
+  /// The wrenches two sweeps before, the extrapolated wrenches with which the last two sweeps began, and the weight of
+  /// the extrapolation.
+  struct Momentum {
+    std::vector<Six> before, begun;
+    double weight = 1;
+  };
+
   void add_sides(Row& row, const ElasticPatch& patch);
   void add_single(Row& row, int link, double sign, Vec3 centroid);
   void add_side(Row& row, int body, std::span<const double> jacobian);
@@ -114,6 +121,7 @@ class ContactSolver {
   double staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const;
   Drift drift(size_t patch, const Step& step, std::span<const MovedOn> ahead) const;
   double visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const;
+  void extrapolate(Momentum& momentum, std::span<Laws> laws, double duration, std::span<double> velocity) const;
   Solution solved(std::span<const Laws> laws, std::span<const double> velocity) const;
   void remember(const Solution& solution, std::span<const Laws> laws, double duration);
 
