@@ -14,6 +14,7 @@ from overlapper.simulation.mujoco.silence import asked_flags
 PLANE, HFIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
 ROWS = 1 << 20  # pairs counted at a time
+TABLED = 256  # the most geoms whose pairs are decided in advance
 
 
 def in_force(model: Any) -> bytes:
@@ -55,9 +56,15 @@ class PairRule:
         first, second = place[model.pair_geom1], place[model.pair_geom2]
         known = (first >= 0) & (second >= 0)
         self._explicit = np.unique(self._code(np.minimum(first, second)[known], np.maximum(first, second)[known]))
+        count = len(geoms)
+        all_pairs = np.indices((count, count)).reshape(2, -1) if count <= TABLED else None
+        self._table = None if all_pairs is None else self._decide(*all_pairs).reshape(count, count)
 
     def allow(self, first: Indices, second: Indices) -> Mask:
         """Whether the geoms at these indices may collide, pair by pair."""
+        return self._decide(first, second) if self._table is None else np.asarray(self._table[first, second])
+
+    def _decide(self, first: Indices, second: Indices) -> Mask:
         if self._none:
             return np.zeros(len(first), dtype=bool)
         group, mask, weld, parent = self._group, self._mask, self._weld, self._parent

@@ -16,17 +16,20 @@ from overlapper.simulation.mujoco.pair_rule import PairRule, in_force
 from overlapper.simulation.mujoco.stepping import MujocoStepping
 from overlapper.simulation.source import Source
 
+XYZW = np.array([1, 2, 3, 0])
+
 
 class GeomPoses:
     """The poses of some geoms of `data`. MuJoCo's quaternions are wxyz."""
 
     def __init__(self, data: Any, colliders: Sequence[LinkKey]) -> None:
         self.colliders = colliders
-        self._data, self._geoms = data, [geom for _, geom in colliders]
+        self._data, self._geoms = data, np.array([geom for _, geom in colliders], dtype=np.intp)
 
     def read(self) -> list[Pose]:
-        positions = self._data.geom_xpos[self._geoms].tolist()
-        return list(zip(positions, self._data.geom_xquat[self._geoms][:, [1, 2, 3, 0]].tolist()))
+        positions = self._data.geom_xpos.take(self._geoms, axis=0)
+        orientations = self._data.geom_xquat.take(self._geoms, axis=0).take(XYZW, axis=1)
+        return list(zip(positions.tolist(), orientations.tolist()))
 
 
 class MujocoSource(Source):
@@ -64,7 +67,8 @@ class MujocoSource(Source):
         return GeomPoses(self._data, [(body, geom) for body, geoms in links.items() for geom in geoms])
 
     def rules(self, layout: Layout) -> PairRule:
-        now = in_force(self._model)
+        assert self._read  # by `refresh`
+        now = self._read[1]
         if not self._rule or self._rule[0] != now or self._rule[1] is not layout:
             geoms = np.array([geom for _, geom in layout.collider_rows], dtype=np.int64)
             self._rule = now, layout, PairRule(self._model, geoms)
