@@ -20,6 +20,7 @@ COMMANDS = {
     "round": "speed.round",
     "steps": "speed.steps",
     "ways": "speed.ways",
+    "mujoco": "speed.engine",
     "stability": "stability.hard_cases",
     "stress": "stability.stress",
     "physics": "forces.physics",
