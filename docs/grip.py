@@ -12,7 +12,7 @@ from overlapper.scenes.run import run
 from overlapper.scenes.scene import load_scene
 from overlapper.tables.outputs import recorder
 
-LOOK = "t=1.24&from=0.745,-0.11,0.25&at=0.548,0,0.198&pair=duck.1,panda.panda_rightfinger"
+LOOK = "t=1.24&from=0.745,-0.11,0.25&at=0.548,0,0.198&pair=duck.1,panda/panda_rightfinger"
 
 
 def main() -> None:

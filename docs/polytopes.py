@@ -22,7 +22,8 @@ class Polytopes:
         self.keys = [(int(id), -1, 0) for id in found]
         self.placed = [Placed(hull) for hull in found.values()]
         self.colors = {key[:2]: GREY for key in self.keys}
-        self.names = {key[:2]: f"polytope {key[0]}/points" for key in self.keys}
+        self.names = {key[:2]: f"polytope {key[0]}" for key in self.keys}
+        self.labels = {key[0]: f"polytope {key[0]}" for key in self.keys}
 
 
 def main() -> None:

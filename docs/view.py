@@ -10,7 +10,7 @@ from pathlib import Path
 
 from photograph import ROOT, photograph
 
-LOOK = "t=1.24&from=0.765,-0.125,0.235&at=0.545,0,0.2&pair=duck.1,panda.panda_rightfinger"
+LOOK = "t=1.24&from=0.765,-0.125,0.235&at=0.545,0,0.2&pair=duck.1,panda/panda_rightfinger"
 
 
 def main() -> None:

@@ -33,7 +33,8 @@ class Bodies:
         for k, (turn, height) in enumerate(CUBES.values()):
             self.placed.append(Placed(CUBE, (0.2 * (k - 1), 0, height - DEPTH), turn))
         self.keys = [(k, -1, 0) for k in range(len(self.placed))]
-        self.names = dict(zip([key[:2] for key in self.keys], ["table", *(f"cube {how}" for how in CUBES)]))
+        self.labels = dict(enumerate(["table", *(f"cube {how}" for how in CUBES)]))
+        self.names = {(body, -1): label for body, label in self.labels.items()}
         self.colors = {key[:2]: (0.62, 0.66, 0.72, 1.0) for key in self.keys}
 
 

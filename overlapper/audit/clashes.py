@@ -236,6 +236,7 @@ class _DrawnMeshes:
     placed: list[Placed]
     colors: dict[tuple[int, int], tuple[float, float, float, float]]
     names: dict[tuple[int, int], str]
+    labels: dict[int, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,9 +265,9 @@ def _drawn(found: Clashes) -> _DrawnMeshes:
         else:
             keys += [(i, -1, k) for k in range(len(body.parts))]
             placed += [Placed(part) for part in body.parts]
-    # A slash would split the name into the name of a body and the name of its link.
-    names = {(i, -1): body.name.replace("/", ".") for i, body in enumerate(found.bodies)}
-    return _DrawnMeshes(keys, placed, dict.fromkeys(names, GREY) | colors, names)
+    labels = {i: body.name for i, body in enumerate(found.bodies)}
+    names = {(i, -1): name for i, name in labels.items()}
+    return _DrawnMeshes(keys, placed, dict.fromkeys(names, GREY) | colors, names, labels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,8 +282,9 @@ class _Shared:
 def _still(bodies: Sequence[MeshBody]) -> Still:
     """The parts at their places. The parts of a mesh are the shapes of one body."""
     keys = [(i, -1, k) for i, body in enumerate(bodies) for k in range(len(body.parts))]
-    names = {(i, -1): body.name for i, body in enumerate(bodies)}
-    return Still(keys, [part for body in bodies for part in body.parts], *_nowhere(len(keys)), names, {})
+    labels = {i: body.name for i, body in enumerate(bodies)}
+    names = {(i, -1): name for i, name in labels.items()}
+    return Still(keys, [part for body in bodies for part in body.parts], *_nowhere(len(keys)), names, labels, {})
 
 
 def _nowhere(count: int) -> tuple[Array, Array]:

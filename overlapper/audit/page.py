@@ -63,6 +63,7 @@ class _DrawnRobot:
     placed: list[Placed]
     colors: dict[tuple[int, int], Color]
     names: dict[tuple[int, int], str]
+    labels: dict[int, str]
 
 
 class _Scene:
@@ -75,13 +76,10 @@ class _Scene:
         links = sorted({key[:2] for key in self._keys})
         # Hues a golden ratio apart stay distinct however many links there are.
         self._colors = {link: (*colorsys.hsv_to_rgb(0.618034 * k % 1, 0.35, 0.85), 1.0) for k, link in enumerate(links)}
-        # A slash would split the name into the name of a body and the name of its link.
-        names = [name.replace("/", ".") for name in robot.link_names]
-        self._names = {
-            (body, link): f"{robot.tree.bodies[body].replace('/', '.')}/{names[link]}" for body, link in links
-        }
+        self._labels = dict(enumerate(robot.tree.bodies))
+        self._names = {(body, link): robot.link_names[link] for body, link in links}
 
     def at(self, values: Array) -> _DrawnRobot:
         (positions,), (orientations,) = self._kinematics.poses(values[None])
         placed = [Placed(*each) for each in zip(self._shapes, positions, orientations)]
-        return _DrawnRobot(self._keys, placed, self._colors, self._names)
+        return _DrawnRobot(self._keys, placed, self._colors, self._names, self._labels)

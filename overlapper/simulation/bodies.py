@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
+from dataclasses import replace
 from difflib import get_close_matches
 from functools import partial
 from typing import Literal, TypeVar
@@ -20,13 +21,14 @@ from overlapper.simulation.ground import Grounds
 from overlapper.simulation.layout import Layout
 from overlapper.simulation.mechanics import Mechanics
 from overlapper.simulation.model import BASE, Array, Color, Decomposed, LinkKey, ModelledBody, Skipped
-from overlapper.simulation.naming import labels, link_names
+from overlapper.simulation.naming import Labels, link_names
 from overlapper.simulation.report import Report
 from overlapper.simulation.source import Source
 
 NOWHERE = "it has no finite pose within 1e25 m: the simulation has diverged"
 
 Which = TypeVar("Which", bound="AnyBodies")
+Named = TypeVar("Named", Skipped, Decomposed)
 
 
 class AnyBodies:
@@ -39,6 +41,7 @@ class AnyBodies:
         """Call this from the constructor of a subclass: warnings then name the line that calls that constructor."""
         self._source = source
         self._grounds = Grounds()
+        self._labelling = Labels()
         self._nowhere: set[int] = set()  # bodies without a finite pose
         # The choice of pairs of the last overlaps(), or the number of pairs if it was a list; then the result.
         self._asked: Literal["simulated", "all"] | int = "simulated"
@@ -264,13 +267,25 @@ class AnyBodies:
 
     @property
     def names(self) -> dict[tuple[int, int], str]:
-        """Names like "panda/panda_hand" by (body, link). Names that are not unique end in "#" and the id."""
+        """Names like "panda/panda_hand" by (body, link); a body of one link has the name of the body, as in `labels`.
+
+        Tables and views have these names.
+        """
         return dict(self._names)
+
+    @property
+    def labels(self) -> dict[int, str]:
+        """Names like "panda" by body. A body keeps its name when other bodies come or go.
+
+        Bodies named after the same kind of shape are told apart by colour or size, such as "red box" or "box 0.1 m".
+        Names that are still not unique end in "#" and the id.
+        """
+        return dict(self._labels)
 
     @property
     def decomposed(self) -> list[Decomposed]:
         """The concave meshes that are modelled as unions of convex parts."""
-        return [each for body in self._source.bodies.values() for each in body.decomposed]
+        return [self._labelled(each) for body in self._source.bodies.values() for each in body.decomposed]
 
     @property
     def settings(self) -> dict[str, str | float]:
@@ -285,7 +300,7 @@ class AnyBodies:
     @property
     def skipped(self) -> list[Skipped]:
         """The shapes that are not modelled, one entry per body and link."""
-        skipped = [each for body in self._source.bodies.values() for each in body.skipped]
+        skipped = [self._labelled(each) for body in self._source.bodies.values() for each in body.skipped]
         return [*skipped, *self._source.skipped, *(self._lost(id) for id in sorted(self._nowhere))]
 
     @property
@@ -312,7 +327,7 @@ class AnyBodies:
             self._arrange()
             self._pose()
             self._rules = self._source.rules(self._layout)
-        for each in (*(skipped or ()), *(self._lost(id) for id in sorted(self._nowhere - before))):
+        for each in (*map(self._labelled, skipped or ()), *(self._lost(id) for id in sorted(self._nowhere - before))):
             message = f"{each.name} (body {each.body}, link {each.link}) is left out: {each.reason}"
             warnings.warn(message, SkippedShapeWarning, stacklevel=stacklevel)
 
@@ -331,6 +346,11 @@ class AnyBodies:
             raise ValueError(f"pairs names {named!r}, which is not a body or link in the simulation{hint}")
         return known[named]
 
+    def _labelled(self, named: Named) -> Named:
+        """The same with the label of its body instead of the body's name."""
+        body = self._source.bodies.get(named.body)
+        return replace(named, name=self._labels[named.body] + named.name[len(body.name) :]) if body else named
+
     def _lost(self, id: int) -> Skipped:
         return Skipped(id, BASE, self._labels[id], NOWHERE, diverged=True)
 
@@ -343,7 +363,8 @@ class AnyBodies:
             (left_out if id in self._nowhere else placed)[id] = body
         self._layout = Layout(placed, self._source.poses)
         self._left_out = Layout(left_out, self._source.poses)
-        self._names, self._labels = link_names(bodies), labels(bodies)
+        self._labels = self._labelling.of(bodies)
+        self._names = link_names(bodies, self._labels)
         self._pairs = AskedPairs(self._layout, {id: body.link_names.keys() for id, body in bodies.items()})
         self._grounds.follow(self._layout, placed)
 

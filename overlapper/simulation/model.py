@@ -129,7 +129,8 @@ class Ground:
 class ModelledBody:
     """A body: `link_names`, `colors` and `parents` by link. `shape_count` is its number of shapes, modelled or not.
 
-    The `ground` of a body is its height field. `shapes` are then the prisms of the ground that are modelled so far.
+    `look` has colour and size in words, for a body that is named after its kind of shape. The `ground` of a body is its
+    height field. `shapes` are then the prisms of the ground that are modelled so far.
     """
 
     name: str
@@ -141,3 +142,4 @@ class ModelledBody:
     skipped: tuple[Skipped, ...] = ()
     decomposed: tuple[Decomposed, ...] = ()
     ground: Ground | None = None
+    look: tuple[str, str] = ("", "")

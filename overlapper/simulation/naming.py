@@ -1,16 +1,19 @@
-"""Readable names of bodies: by file, by the name of a robot, or by mesh or kind of shape."""
+"""Readable names of bodies: by file, by the name of a robot, by mesh, or by kind, colour and size of a shape."""
 
 from __future__ import annotations
 
+import colorsys
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
+from itertools import chain, count
 from pathlib import PurePath
 
 import numpy as np
 
+from overlapper import Placed
 from overlapper.printable import printable
-from overlapper.simulation.model import LinkKey, ModelledBody
+from overlapper.simulation.model import Color, LinkKey, ModelledBody, ModelledShape
 
 ENDINGS = (".urdf", ".sdf", ".xml", ".obj", ".stl", ".dae")
 
@@ -68,20 +71,107 @@ def named(names: Mapping[int, str] | None) -> dict[int, str]:
     return {int(body): printable(name) for body, name in (names or {}).items()}
 
 
+Look = tuple[str, str]
+"""Colour and size in words."""
+
+DESCRIPTIONS: tuple[Callable[[str, str, str], str], ...] = (
+    lambda name, color, size: name,
+    lambda name, color, size: f"{color} {name}".strip(),
+    lambda name, color, size: f"{name} {size}".strip(),
+    lambda name, color, size: f"{color} {name} {size}".strip(),
+)
+
+
+class Labels:
+    """The distinct names of bodies in tables and views. A body keeps its label when other bodies come or go."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, str, Look], str] = {}
+        self._looks: dict[str, set[Look]] = {}  # by name
+
+    def of(self, bodies: Mapping[int, ModelledBody]) -> dict[int, str]:
+        """The labels of bodies by number.
+
+        If new bodies have the same name, it is preceded by their colours or followed by their sizes, if these differ.
+        Names that are still not unique end in "#" and the number of the body.
+        """
+        keys = {id: (id, body.name, body.look) for id, body in bodies.items()}
+        fresh = {id: bodies[id] for id, key in keys.items() if key not in self._known}
+        taken = set(self._known.values())
+        for name in dict.fromkeys(body.name for body in fresh.values()):
+            looks = {id: body.look for id, body in fresh.items() if body.name == name}
+            before = self._looks.setdefault(name, set())
+            # The shortest of the descriptions that tell most bodies apart.
+            describe = max(
+                DESCRIPTIONS,
+                key=lambda way: len(
+                    {way(name, *each) for each in looks.values()} - {way(name, *each) for each in before}
+                ),
+            )
+            for id, label in _distinct({id: describe(name, *each) for id, each in looks.items()}, taken).items():
+                self._known[keys[id]] = label
+                taken.add(label)
+            before.update(looks.values())
+        return {id: self._known[key] for id, key in keys.items()}
+
+
 def labels(bodies: Mapping[int, ModelledBody]) -> dict[int, str]:
-    """The names of bodies. Names that are not unique end in "#" and the number of the body."""
-    return _distinct({id: body.name for id, body in bodies.items()})
+    """The labels of bodies that are read once."""
+    return Labels().of(bodies)
 
 
-def link_names(bodies: Mapping[int, ModelledBody]) -> dict[LinkKey, str]:
-    """Label and name of each link. Names that are not unique in a body end in "#" and the number of the link."""
+def _distinct(names: Mapping[int, str], taken: Container[str] = ()) -> dict[int, str]:
+    number = Counter(names.values())
     return {
-        (id, link): f"{label}/{name}" if name else label
-        for id, label in labels(bodies).items()
+        id: name if number[name] == 1 and name not in taken else _numbered(name, id, taken)
+        for id, name in names.items()
+    }
+
+
+def _numbered(name: str, id: int, taken: Container[str]) -> str:
+    numbers = chain([f"{id}"], (f"{id}.{time}" for time in count(2)))
+    return next(label for each in numbers if (label := f"{name}#{each}") not in taken)
+
+
+def link_names(bodies: Mapping[int, ModelledBody], labels: Mapping[int, str]) -> dict[LinkKey, str]:
+    """The label of each body of one link; label and name of each other link.
+
+    Names that are not unique in a body end in "#" and the number of the link.
+    """
+    return {
+        (id, link): link_name(label, bodies[id].link_names, name)
+        for id, label in labels.items()
         for link, name in _distinct(bodies[id].link_names).items()
     }
 
 
-def _distinct(names: Mapping[int, str]) -> dict[int, str]:
-    number = Counter(names.values())
-    return {id: name if number[name] == 1 else f"{name}#{id}" for id, name in names.items()}
+def link_name(body: str, links: Mapping[int, str], name: str) -> str:
+    """The name of a link of a body with these links: the name of the body if it has no other link."""
+    return f"{body}/{name}" if name and len(links) > 1 else body
+
+
+HUES = {15: "red", 45: "orange", 70: "yellow", 165: "green", 195: "cyan", 255: "blue", 290: "purple", 345: "pink"}
+"""The words for hues, by the degree at which they end."""
+
+
+def look(color: Color | None, shapes: Sequence[ModelledShape]) -> Look:
+    """Colour and size in words, as a reader sees them; empty words for what is not seen.
+
+    The size is the longest side of a box around the shapes, along the axes of their link.
+    """
+    boxes = [np.asarray(Placed(each.shape, each.position, each.orientation).bounds) for each in shapes]
+    size = float(np.ptp(np.concatenate(boxes), axis=0).max()) if boxes else np.inf
+    said = "" if not np.isfinite(size) else f"{size:.3g} m" if size >= 0.01 else f"{1e3 * size:.3g} mm"
+    return _color_word(color) if color else "", said
+
+
+def _color_word(color: Color) -> str:
+    hue, saturation, value = colorsys.rgb_to_hsv(*color[:3])
+    if not color[3]:
+        return ""
+    if value < 0.2:
+        return "black"
+    if saturation < 0.15:
+        return "white" if value > 0.9 else "grey"
+    word = next((word for end, word in HUES.items() if 360 * hue < end), "red")
+    return "brown" if word == "orange" and value < 0.7 else word

@@ -31,6 +31,7 @@ class Still:
     positions: NDArray[np.float64]
     orientations: NDArray[np.float64]
     names: dict[tuple[int, int], str]
+    labels: dict[int, str]
     colors: dict[tuple[int, int], tuple[float, float, float, float]]
     forces: Forces | None = None
     skipped: tuple[Skipped, ...] = ()
@@ -44,6 +45,7 @@ class Still:
             bodies.positions.copy(),
             bodies.orientations.copy(),
             bodies.names,
+            bodies.labels,
             bodies.colors,
             forces,
             tuple(bodies.skipped),
@@ -65,6 +67,7 @@ class Still:
             ordered[:, :3],
             ordered[:, 3:],
             {(body, link): f"body {body}/link {link}" for body, link in links},
+            {body: f"body {body}" for body, _ in links},
             dict.fromkeys(links, (0.6, 0.6, 0.6, 1.0)),
         )
 

@@ -45,7 +45,8 @@ def _dressed(before: Still | None, after: Still | None) -> Still | None:
     """The recorded step with today's names and colours, because a recording has none."""
     if before is None or after is None:
         return before
-    return replace(before, names=before.names | after.names, colors=before.colors | after.colors)
+    names, labels = before.names | after.names, before.labels | after.labels
+    return replace(before, names=names, labels=labels, colors=before.colors | after.colors)
 
 
 def _recording(stills: Sequence[tuple[Still, str]], tolerance: float) -> bytes:

@@ -10,7 +10,7 @@ from overlapper import Overlap, Placed
 
 ROOT = "/overlapper/bodies"
 Pair = tuple[str, str]
-LinkName = tuple[str, str]  # body and link
+LinkName = tuple[str, str]  # names of a body and of its link, as in tables
 Key = tuple[int, ...]  # bodyA, linkA, shapeA, bodyB, linkB, shapeB
 
 # meshcat's tree and panel look names up in JavaScript objects, which have these names by default. "<object>" is
@@ -21,7 +21,10 @@ INHERITED |= {"toString", "valueOf", "<object>"}
 
 
 class DrawnBodies(Protocol):
-    """Shapes in the world by (body, link, shape), and the colours and distinct names of links."""
+    """Shapes in the world by (body, link, shape), colours and distinct names of links, and labels of bodies.
+
+    The name of a link may begin with the label of its body and a slash.
+    """
 
     @property
     def keys(self) -> Sequence[tuple[int, int, int]]: ...
@@ -31,6 +34,8 @@ class DrawnBodies(Protocol):
     def colors(self) -> Mapping[tuple[int, int], Sequence[float]]: ...
     @property
     def names(self) -> Mapping[tuple[int, int], str]: ...
+    @property
+    def labels(self) -> Mapping[int, str]: ...
 
 
 class DrawnContact(Protocol):
@@ -60,24 +65,28 @@ def must_be_drawn(bodies: object, contacts: object) -> None:
         raise TypeError(f"contacts must be what Bodies.overlaps() returns, not {contacts!r}")
 
 
-def link_names(bodies: DrawnBodies) -> dict[tuple[int, int], tuple[str, str]]:
-    """The names of body and link in the tree. They have no slashes, as a slash begins a new level."""
-    names = {}
-    for (body, link), name in bodies.names.items():
-        first, _, rest = name.partition("/")
-        names[body, link] = _unlike(first or str(body)), _unlike(rest.replace("/", ".") or str(link))
-    return names
+def own_names(bodies: DrawnBodies) -> dict[tuple[int, int], tuple[str, str]]:
+    """The label of the body of each link, and the name of the link without that label."""
+    return {
+        (body, link): (label, "base" if name == label else name.removeprefix(f"{label}/"))
+        for (body, link), name in bodies.names.items()
+        for label in [bodies.labels[body]]
+    }
 
 
-def _unlike(name: str) -> str:
-    """The name, in quotes if JavaScript objects have it by default, or if it begins and ends with a quote."""
+def in_tree(name: str) -> str:
+    """The name of a node. A slash begins a new level of the tree, so names have another one.
+
+    Names that JavaScript objects have by default are in quotes, and names that begin and end with a quote.
+    """
+    name = name.replace("/", "\u2215")
     return f"'{name}'" if name in INHERITED or name[:1] == name[-1:] == "'" else name
 
 
 def body_paths(bodies: DrawnBodies) -> list[str]:
     """The path `/overlapper/bodies/<body>/<link>/<shape>` of each shape."""
-    names = link_names(bodies)
-    return [f"{ROOT}/{'/'.join(names[body, link])}/{shape}" for body, link, shape in bodies.keys]
+    names = {link: "/".join(map(in_tree, own)) for link, own in own_names(bodies).items()}
+    return [f"{ROOT}/{names[body, link]}/{shape}" for body, link, shape in bodies.keys]
 
 
 def key_of(contact: DrawnContact) -> Key:
@@ -87,20 +96,18 @@ def key_of(contact: DrawnContact) -> Key:
 def labelled(
     bodies: DrawnBodies, contacts: Iterable[DrawnContact]
 ) -> Iterator[tuple[Pair, tuple[LinkName, LinkName], DrawnContact]]:
-    """The name of each overlapping pair, its bodies and links, and the pair. The link of a body of one link is ""."""
-    names = link_names(bodies)
-    links = Counter(body for body, _ in names)
+    """The names of each overlapping pair, its bodies and links, and the pair.
+
+    The names are those of the links. A shape has its number behind a dot if the link has several shapes.
+    """
+    names, labels = bodies.names, bodies.labels
     shapes = Counter((body, link) for body, link, _ in bodies.keys)
 
-    def where(body: int, link: int) -> LinkName:
-        first, rest = names[body, link]
-        return first, rest if links[body] > 1 else ""
-
     def name(body: int, link: int, shape: int) -> str:
-        label = ".".join(filter(None, where(body, link)))
-        return f"{label}.{shape}" if shapes[body, link] > 1 else label
+        return f"{names[body, link]}.{shape}" if shapes[body, link] > 1 else names[body, link]
 
     for c in contacts:
         if c.overlap:
             pair = name(c.bodyA, c.linkA, c.shapeA), name(c.bodyB, c.linkB, c.shapeB)
-            yield pair, (where(c.bodyA, c.linkA), where(c.bodyB, c.linkB)), c
+            links = (labels[c.bodyA], names[c.bodyA, c.linkA]), (labels[c.bodyB], names[c.bodyB, c.linkB])
+            yield pair, links, c

@@ -19,7 +19,7 @@ import numpy as np
 
 from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker
 from overlapper.viewer.framing import Framing
-from overlapper.viewer.labels import DrawnBodies, DrawnContact, body_paths, key_of, labelled, must_be_drawn
+from overlapper.viewer.labels import DrawnBodies, DrawnContact, body_paths, in_tree, key_of, labelled, must_be_drawn
 from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, volume_text
 from overlapper.viewer.pressure import DrawnForces, Forces, Scale, force_text
 from overlapper.viewer.recording import Recording
@@ -142,7 +142,7 @@ class Viewer:
         self._pushing = bool(seen.arrows)
         scale = f"{FORCES}/{seen.scale}, {seen.scale.pressure}"
         for each in seen.arrows:
-            pair = "-".join(".".join(filter(None, link)) for link in each.links)
+            pair = "-".join(in_tree(name) for _, name in each.links)
             force = force_text(float(np.linalg.norm(each.force)))
             self.visualizer[f"{scale}/{pair}/{force}"].set_object(stage.force(each, seen.scale))
 
@@ -160,4 +160,4 @@ class Viewer:
 
 
 def _path(pair: tuple[str, str]) -> str:
-    return f"/overlapper/overlaps/{pair[0]}-{pair[1]}"
+    return f"/overlapper/overlaps/{'-'.join(map(in_tree, pair))}"

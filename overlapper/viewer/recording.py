@@ -35,6 +35,7 @@ from overlapper.viewer.labels import (
     key_of,
     labelled,
     must_be_drawn,
+    own_names,
 )
 from overlapper.viewer.look import (
     BODIES,
@@ -110,6 +111,7 @@ class Recording:
         self._names: list[str] = []
         self._bodies: dict[str, tuple[bytes, str]] = {}
         self._nodes: dict[str, int] = {}
+        self._owners: list[tuple[str, str]] = []  # the label of the body of each node, and the link's own name
         self._grounds: list[int] = []  # nodes
         self._poses: dict[str, tuple[float, ...]] = {}  # the last pose of each node
         self._keys: list[tuple[int, int, tuple[float, ...]]] = []  # frame, node, pose
@@ -171,9 +173,9 @@ class Recording:
         self._names.append(name)
         for each in getattr(bodies, "skipped", ()):  # bodies outside a simulation have no `skipped`
             self._left_out[f"{each.name}, {each.reason}"] = None
-        colors = bodies.colors
+        colors, owners = bodies.colors, own_names(bodies)
         places = {
-            self._add_body(self._stage, path, placed, colors[key[:2]]): _pose(self._stage, placed)
+            self._add_body(self._stage, path, placed, colors[key[:2]], owners[key[:2]]): _pose(self._stage, placed)
             for path, key, placed in zip(body_paths(bodies), bodies.keys, bodies.placed, strict=True)
         }
         absent = (0.0,) * 7
@@ -252,6 +254,7 @@ class Recording:
             "pairs": list(self._pairs),
             "links": list(self._links.values()),
             "nodes": list(self._nodes),
+            "owners": self._owners,
             "center": stage.center.tolist(),
             "size": stage.size,
             "moment": max(framing.moment, 0),
@@ -302,7 +305,7 @@ class Recording:
             "planes": np.concatenate(self._polytopes.planes).T if rows else np.empty(0, np.float32),
         }
 
-    def _add_body(self, stage: Stage, path: str, placed: Placed, color: Sequence[float]) -> str:
+    def _add_body(self, stage: Stage, path: str, placed: Placed, color: Sequence[float], owner: tuple[str, str]) -> str:
         """The node of the body. A new body is drawn."""
         shape = pickle.dumps(placed.shape)
         drawn, node = self._bodies.get(path, (None, path))
@@ -311,6 +314,7 @@ class Recording:
             self._visualizer[node].set_object(stage.body(placed, color))
             self._bodies[path] = shape, node
             self._nodes[node] = len(self._nodes)
+            self._owners.append(owner)
             if stage.drawing.ground(placed):
                 self._grounds.append(self._nodes[node])
         return node

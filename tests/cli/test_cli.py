@@ -129,16 +129,16 @@ def test_shapes_that_are_not_modelled_are_named_below_the_table(tmp_path):
     assert done.returncode == 1
     assert "Nothing overlaps in 2 steps." in done.stdout
     assert "2 bodies, 1 of 2 shapes read" in done.stdout
-    assert re.search(r"^Not modelled: mesh/link0, .*concave", done.stdout, re.MULTILINE)
+    assert re.search(r"^Not modelled: mesh, .*concave", done.stdout, re.MULTILINE)
     assert done.stderr == ""
     (told,) = json.loads(overlapper("run", "bent.py", "--json").stdout)["skipped"]
-    assert (told["name"], told["first_step"], told["diverged"]) == ("mesh/link0", 1, False)
+    assert (told["name"], told["first_step"], told["diverged"]) == ("mesh", 1, False)
     (tmp_path / "bent.py").write_text(f'"""Bent."""{BENT}')
     checked("bent.py", "--record")
     recorded = checked("bent.py")
     done = overlapper("view", "bent.py", "--png", "bent.png")
-    assert done.returncode == 1 and "Not modelled: mesh/link0, " in done.stderr
-    assert recorded[0] == 0 and "    note: not modelled: mesh/link0, " in recorded[1]
+    assert done.returncode == 1 and "Not modelled: mesh, " in done.stderr
+    assert recorded[0] == 0 and "    note: not modelled: mesh, " in recorded[1]
 
 
 CROSSES = '''
@@ -190,7 +190,7 @@ def test_links_as_a_whole_are_measured_where_their_shapes_overlap_each_other(tmp
     assert [row["step"] for row in links] == [1, 2]
     for row in links:
         assert row["shapeA"] is row["shapeB"] is row["area_m2"] is None
-        assert (row["nameA"], row["nameB"], row["status"]) == ("body 0/link0", "body 1/link0", "overlapping")
+        assert (row["nameA"], row["nameB"], row["status"]) == ("body 0", "body 1", "overlapping")
         assert row["volume_m3"] == pytest.approx(2 * 0.2**3, rel=1e-6)
         step = [each for each in shapes if each["step"] == row["step"]]
         assert sum(each["volume_m3"] for each in step) > 1.4 * row["volume_m3"]
@@ -231,9 +231,7 @@ def test_a_concave_mesh_is_named_with_its_parts_and_where_they_are_kept(tmp_path
     first, second = (overlapper("run", "cup.py") for _ in range(2))
     assert first.stdout == second.stdout
     assert "CoACD decomposes a mesh of 28 triangles, once" in first.stderr and second.stderr == ""
-    words = (
-        r"^Concave: mesh/link0 is (\d+) convex parts of (\S+) m³ together, the mesh bounds (\S+) m³; kept in (.*)\.$"
-    )
+    words = r"^Concave: mesh is (\d+) convex parts of (\S+) m³ together, the mesh bounds (\S+) m³; kept in (.*)\.$"
     parts, volume, mesh, path = re.search(words, first.stdout, re.MULTILINE).groups()
     assert int(parts) >= 5
     assert float(mesh) == pytest.approx(8e-3 - 0.16**2 * 0.18, rel=1e-3)
@@ -243,7 +241,7 @@ def test_a_concave_mesh_is_named_with_its_parts_and_where_they_are_kept(tmp_path
     cap = 3.14159 * 0.01**2 * (0.09 - 0.01) / 3  # of a ball of 3 cm, 1 cm high
     assert pair["largest_volume_m3"] == pytest.approx(cap, rel=0.05)
     skipped = overlapper("run", "cup.py", "--concave", "skip")
-    assert "Not modelled: mesh/link0, a concave mesh is left out" in skipped.stdout
+    assert "Not modelled: mesh, a concave mesh is left out" in skipped.stdout
 
 
 def test_a_threshold_out_of_range_is_refused():
@@ -259,8 +257,8 @@ def test_a_run_prints_a_table_of_pairs_with_units():
     quantities, units, _, first, second = lines[next(k for k, line in enumerate(lines) if "volume" in line) :][:5]
     assert quantities.split() == ["volume", "±", "depth", "normal", "at"]
     assert units.split() == ["pair", "of", "links", "steps", "cm³", "cm³", "mm", "x,", "y,", "z", "step"]
-    assert first.split()[0] == "box#0/link0"
-    assert second.split() == ["box#1/link0"]
+    assert first.split()[0] == "box#0"
+    assert second.split() == ["box#1"]
     steps, volume, _, depth, *normal, _ = first.split()[1:]
     assert (steps, volume, depth, normal) == ("8", "200", "20", ["+0.00", "+0.00", "-1.00"])
     assert "2 of 2 shapes read" in done.stdout

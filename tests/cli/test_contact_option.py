@@ -105,7 +105,7 @@ def test_a_sweep_keeps_the_largest_force_and_compares_it():
     overlapper(*given, "--out", "runs")
     tasks = sorted(pyarrow.parquet.read_table("runs/tasks.parquet").to_pylist(), key=lambda row: row["mass"])
     assert [row["largest_force_n"] for row in tasks] == pytest.approx([9.81, 19.62])
-    assert [(row["hardestA"], row["hardestB"]) for row in tasks] == [("plane/link0", "box/link0")] * 2
+    assert [(row["hardestA"], row["hardestB"]) for row in tasks] == [("plane", "box")] * 2
     steps = pyarrow.parquet.read_table("runs/steps.parquet").to_pylist()
     assert [row["force_z_n"] for row in steps if row["mass"] == 2] == pytest.approx([-19.62] * 3)
     page = Path("runs/summary.html").read_text(encoding="utf-8")
@@ -134,4 +134,4 @@ def test_contacts_without_a_direction_are_reported_once():
     Path("within.py").write_text(WITHIN, encoding="utf-8")
     done = overlapper("run", "within.py")
     (line,) = done.stderr.splitlines()
-    assert line.startswith("overlapper: box/link0 and sphere/link0 overlap without a direction of force")
+    assert line.startswith("overlapper: box and sphere overlap without a direction of force")

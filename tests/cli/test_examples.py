@@ -137,7 +137,7 @@ def test_polytopes_of_a_database_share_less_than_each_of_them(run, tmp_path):
 def test_links_of_a_chain_share_less_than_their_hulls(run, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     text = run("chain_links.py")
-    rings = numbers(r"\S+/link0: (\d+) parts, ([\d.]+) cm³, mesh ([\d.]+) cm³", text)
+    rings = numbers(r"\S+: (\d+) parts, ([\d.]+) cm³, mesh ([\d.]+) cm³", text)
     assert len(rings) == 2
     for parts, volume, mesh in rings:
         assert parts > 4

@@ -211,13 +211,13 @@ def test_the_row_the_text_the_page_and_the_exit_code_say_what_a_task_left_out():
         "balls: 3 of 3 tasks are done.",
         "1 of 3 tasks have diverged: a body had no finite pose, and was left out. "
         "The first is box#1 of lost=a body, in step 2.",
-        "1 of 3 tasks have shapes that are not modelled. The first is open/link0 of lost=a shape.",
+        "1 of 3 tasks have shapes that are not modelled. The first is open of lost=a shape.",
     ]
     columns = ("skipped", "first_skipped", "diverged", "first_diverged", "diverged_step")
     assert {row["lost"]: tuple(row[name] for name in columns) for row in rows("runs")} == {
         "nothing": (0, None, 0, None, None),
         "a body": (0, None, 1, "box#1", 2),
-        "a shape": (1, "open/link0", 0, None, None),
+        "a shape": (1, "open", 0, None, None),
     }
     assert "1 of 3 tasks have diverged" in Path("runs/summary.html").read_text()
     told = json.loads(sweep(*words, "--out", "runs", "--json").stdout)

@@ -116,7 +116,7 @@ def test_pair_filters_that_the_script_sets_are_known():
     said = [watch("--json", f"--pairs={pairs}", "script.py").stderr for pairs in ("simulated", "all")]
     answers = [json.loads(words.splitlines()[-1]) for words in said]
     fewer, more = ({tuple(pair["names"]) for pair in answer["simulations"][0]["pairs"]} for answer in answers)
-    assert more - fewer == {("box#0/link0", "box#1/link0")}
+    assert more - fewer == {("box#0", "box#1")}
 
 
 def test_every_so_many_steps_are_measured():
@@ -316,7 +316,7 @@ def test_bodies_are_named_by_the_command_and_options_of_ours_behind_the_script_a
         "--name", "0=table", "--name", "1=cup", "--name=9=duck", "--every", "1", "script.py", "--out=a.csv", "--every=3"
     )
     assert (done.returncode, done.stdout) == (0, "['script.py', '--out=a.csv', '--every=3']\n")
-    assert "table/link0" in done.stderr and "cup/link0" in done.stderr
+    assert "table" in done.stderr and "cup" in done.stderr
     assert done.stderr.splitlines()[-2:] == [
         "overlapper: --name 9=duck: there is no body 9",
         "overlapper: --out stands after script.py and was an argument of the script: "

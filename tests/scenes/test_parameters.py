@@ -60,7 +60,7 @@ def test_a_value_has_the_kind_of_its_default(balls):
     assert [type(value) for value in scene.parameters.values()] == [float, int, str, bool]
     assert scene.title == "balls (apart=1.0, count=3, name=7, gravity=True)"
     (frame,) = run(load_scene(balls, {"apart": "0.1", "name": "b"}), only=[1])
-    assert frame.bodies.names == {(0, -1): "b0/link0", (1, -1): "b1/link0"}
+    assert frame.bodies.names == {(0, -1): "b0", (1, -1): "b1"}
     assert frame.contacts[0].overlap.depth == pytest.approx(0.1)
 
 
@@ -99,7 +99,7 @@ def test_tables_say_the_parameters_and_are_shown_with_them(tmp_path, ending):
     assert json.loads(done.stdout)["parameters"] == {"apart": 0.1, "count": 2, "name": "a=b", "gravity": False}
     heading = read_metadata(tmp_path / table)
     assert (heading["set apart"], heading["set name"], heading["set gravity"]) == ("0.1", "a=b", "False")
-    assert {row["nameA"] for row in read_table(tmp_path / table)} == {"a=b0/link0"}
+    assert {row["nameA"] for row in read_table(tmp_path / table)} == {"a=b0"}
     # Without the parameters of the table, another scene would be seen, and it would be said.
     playback = play(table, scene="balls.py")
     assert [frame.contacts[0].overlap.depth for frame in playback.views] == pytest.approx([0.1] * 2)

@@ -177,7 +177,7 @@ def test_names_are_those_of_the_model_and_unique(client):
     names = Bodies(client).names
     assert names[0, -1] == "panda#0/panda_link0" and names[1, 8] == "panda#1/panda_hand"
     assert names[2, -1] == "physics/base_link"
-    assert names[3, -1] == "box/link0"
+    assert names[3, -1] == "box"
     assert len(set(names.values())) == len(names)
 
 

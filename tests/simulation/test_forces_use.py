@@ -121,7 +121,7 @@ def test_a_step_outside_of_the_with_block_is_refused(world):
 def test_too_few_substeps_are_reported_once_with_the_number_needed(world):
     resting(world)
     said = (
-        r"^1 substeps are too few for the stiffness between plane/link0 and box/link0, which oscillate at up to "
+        r"^1 substeps are too few for the stiffness between plane and box, which oscillate at up to "
         r"(\d+) rad/s: with fewer than (\d+) substeps, their contact loses energy$"
     )
     with world.contact(stiffness=1e9, substeps=1) as contact:

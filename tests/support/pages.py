@@ -6,6 +6,7 @@ import base64
 import gzip
 import json
 import re
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,7 +30,8 @@ class GreenBodies:
     def __init__(self, shapes: dict[tuple[int, int, int], Placed]) -> None:
         self.keys = sorted(shapes)
         self.placed = [shapes[key] for key in self.keys]
-        self.names = {(0, -1): "ground/base", (1, -1): "cup/base", (2, 3): "arm/hand", (2, 4): "arm/finger"}
+        self.names = {(0, -1): "ground", (1, -1): "cup", (2, 3): "arm/hand", (2, 4): "arm/finger"}
+        self.labels = {0: "ground", 1: "cup", 2: "arm"}
         self.colors = dict.fromkeys(self.names, GREEN)
 
     def contacts(self) -> list[Contact]:
@@ -54,7 +56,13 @@ class Scene:
 
     @property
     def names(self):
-        return {(body, link): f"body{body}/link{link}" for body, link, _ in self.keys}
+        links = {key[:2] for key in self.keys}
+        count = Counter(body for body, _ in links)
+        return {(body, link): f"body{body}" + f"/link{link}" * (count[body] > 1) for body, link in links}
+
+    @property
+    def labels(self):
+        return {body: f"body{body}" for body, _, _ in self.keys}
 
     @property
     def colors(self):

@@ -34,7 +34,7 @@ def test_every_point_is_a_row_with_what_its_run_came_to_and_is_done_once():
         disc = np.pi * (0.1**2 - apart**2 / 4) if apart < 0.2 else 0
         assert (row["mean_force_x_m2"] or 0) == pytest.approx(-disc, rel=1e-6)
         assert abs(row["mean_torque_z_m3"] or 0) < 1e-9
-        names = ("box/link0",) if not disc else (row["worstA"], row["worstB"])
+        names = ("box",) if not disc else (row["worstA"], row["worstB"])
         assert (row["worstA"] is None) == (disc == 0) and len(set(names)) == len(names)
         assert row["worst_step"] == (1 if disc else None) == row["deepest_step"]
     # More points are more tasks; none of those that are there is done again.

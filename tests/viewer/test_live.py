@@ -54,7 +54,7 @@ def test_a_live_view_shows_the_last_step_and_ends_with_its_server():
             bodies = hand_at(0.12)
             viewer.show(bodies, bodies.contacts())
             arm, cup = "/overlapper/bodies/arm/hand/0", "/overlapper/bodies/cup/base/0"
-            assert live_paths(viewer) == {arm, cup, "/overlapper/overlaps/cup-arm.hand/1.34 dm³"}
+            assert live_paths(viewer) == {arm, cup, "/overlapper/overlaps/cup-arm∕hand/1.34 dm³"}
             viewer.show(GreenBodies({CUP: Placed(Sphere(0.1))}), [])
             assert live_paths(viewer) == {cup}
         assert server.returncode is not None
@@ -89,14 +89,14 @@ def test_a_live_view_has_an_arrow_and_tells_its_scale_until_forces_are_gone():
     with Viewer() as viewer:
         bodies = hand_at(0.12)
         viewer.show(bodies, bodies.contacts(), Push())
-        overlap = "/overlapper/overlaps/cup-arm.hand/1.34 dm³"
+        overlap = "/overlapper/overlaps/cup-arm∕hand/1.34 dm³"
         (arrow,) = {each for each in live_paths(viewer) if "forces" in each}
-        assert arrow == "/overlapper/forces/1 cm = 5 N, 8 kPa/cup-arm.hand/30.1 N"
+        assert arrow == "/overlapper/forces/1 cm = 5 N, 8 kPa/cup-arm∕hand/30.1 N"
         # A scale stays until arrows or colours have outgrown it.
         viewer.show(bodies, bodies.contacts(), Push(np.array([0.9e5])))
         assert arrow in live_paths(viewer)
         viewer.show(bodies, bodies.contacts(), Push(np.array([5e5])))
-        assert "/overlapper/forces/1 cm = 5 N, 40 kPa/cup-arm.hand/30.1 N" in live_paths(viewer)
+        assert "/overlapper/forces/1 cm = 5 N, 40 kPa/cup-arm∕hand/30.1 N" in live_paths(viewer)
         viewer.show(bodies, bodies.contacts())
         assert live_paths(viewer) == {"/overlapper/bodies/arm/hand/0", "/overlapper/bodies/cup/base/0", overlap}
 

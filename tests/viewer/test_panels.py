@@ -209,7 +209,7 @@ def test_a_chart_of_nothing_says_so(browser, tmp_path):
 
 
 def test_a_pair_that_is_apart_at_a_time_says_so(browser, reach):
-    opened(browser, reach, "#t=0&pair=cup,arm.hand")
+    opened(browser, reach, "#t=0&pair=cup,arm/hand")
     assert "share nothing at this time" in text(browser, "#numbers")
 
 
@@ -269,7 +269,7 @@ def test_a_button_copies_the_link_to_this_moment(browser, piled):
 
 
 def test_every_key_is_listed_on_a_question_mark(browser, reach):
-    opened(browser, reach, "#t=1&pair=cup,arm.hand")
+    opened(browser, reach, "#t=1&pair=cup,arm/hand")
     browser.press("?")
     assert browser.ask("document.querySelector('#keys').open")
     listed = browser.ask("[...document.querySelectorAll('#keys kbd')].map(each => each.textContent)")
@@ -297,7 +297,7 @@ def test_keys_go_from_the_largest_overlap_to_the_next(browser, piled):
     for key in ("n", "n", "n", "p", "p", "p"):
         browser.press(key)
         shown.append(text(browser, "#numbers div").replace("×", "").strip())
-    names = ["body0 – body20.link1", "body0 – body20.link0.1", "body0 – body16"]
+    names = ["body0 – body20/link1", "body0 – body20/link0.1", "body0 – body16"]
     assert shown[:5] == [*names, *names[1::-1]]
     assert shown[5] == "body0 – body1"  # the smallest
     browser.press("Escape")

@@ -38,7 +38,7 @@ def test_the_numbers_are_those_of_each_frame(tmp_path):
     assert film.heading["times"] == [0, 1]
     assert film.sightings(0) == {}
     ((polytope, (volume, error, depth, area, *rest)),) = film.sightings(1).values()
-    assert list(film.sightings(1)) == [("cup", "arm.hand")]
+    assert list(film.sightings(1)) == [("cup", "arm/hand")]
     assert polytope == 0
     assert_allclose([volume, depth, area], [0.08 * 0.14 * 0.12, 0.08, 0.0752], rtol=1e-5)
     assert 0 < error < 1e-15

@@ -189,7 +189,8 @@ class Bodies:
     """Two green shapes."""
 
     keys = ((0, -1, 0), (1, -1, 0))
-    names = {(0, -1): "cup/base", (1, -1): "hand/base"}  # noqa: RUF012
+    names = {(0, -1): "cup", (1, -1): "hand"}  # noqa: RUF012
+    labels = {0: "cup", 1: "hand"}  # noqa: RUF012
     colors = dict.fromkeys(names, (0.1, 0.8, 0.1, 1.0))
 
     def __init__(self, a, b):

@@ -6,8 +6,9 @@ The file has all shapes in single precision. The report has double precision, bu
 from __future__ import annotations
 
 import colorsys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pybullet
@@ -28,7 +29,7 @@ from overlapper.simulation.model import (
     Skipped,
 )
 from overlapper.simulation.modelling import in_one_sentence, modelled
-from overlapper.simulation.naming import body_name
+from overlapper.simulation.naming import body_name, link_name, look
 from overlapper.simulation.settings import Modelling
 
 REPORTED = {  # by getCollisionShapeData
@@ -39,6 +40,7 @@ REPORTED = {  # by getCollisionShapeData
     pybullet.GEOM_CYLINDER: "cylinder",
     pybullet.GEOM_PLANE: "plane",
 }
+Visual = tuple[Any, ...]  # of getVisualShapeData
 MESHES = ("hull", "concave mesh")  # both reported as GEOM_MESH
 
 
@@ -61,7 +63,9 @@ def read_body(
     link_names = {BASE: base or "base"} | {joint[0]: printable(joint[12].decode(errors="replace")) for joint in joints}
     parents = {joint[0]: joint[16] for joint in joints}
     leaves = _leaves(client, id, file, saved) if saved else {}
-    name = given or _name(client, id, own, loaded, leaves) or f"body {id}"
+    visuals: Sequence[Visual] = pybullet.getVisualShapeData(id, physicsClientId=client)
+    own_name, kind = _name(own, loaded, visuals, () if joints else leaves.get(BASE, ()))
+    name = given or own_name or f"body {id}"
     shapes: list[ModelledShape] = []
     skipped: list[Skipped] = []
     decomposed: list[Decomposed] = []
@@ -76,7 +80,7 @@ def read_body(
         shapes += made
         count = len(made) + len(reasons)
         shape_count += count
-        label = f"{name}/{link_names[link]}"
+        label = link_name(name, link_names, link_names[link])
         if reasons:
             skipped.append(Skipped(id, link, label, in_one_sentence(reasons, count)))
         decomposed += [
@@ -85,7 +89,10 @@ def read_body(
     if not saved:
         soft = body_type(client, id) == SOFT_BODY
         skipped.append(Skipped(id, BASE, name, "a soft body is not modelled" if soft else "saveBullet leaves it out"))
-    colors = _colors(client, id, link_names)
+    seen: dict[int, Color] = {}  # of the first visual shape of each link
+    for visual in visuals:
+        seen.setdefault(visual[1], visual[7])
+    colors = _colors(id, seen, link_names)
     return ModelledBody(
         name,
         link_names,
@@ -96,24 +103,21 @@ def read_body(
         tuple(skipped),
         tuple(decomposed),
         ground,
+        look(seen.get(BASE), shapes) if name == kind and not given else ("", ""),
     )
 
 
-def _name(client: int, id: int, own: str, loaded: Loaded | None, leaves: Mapping[int, tuple[Leaf, ...]]) -> str:
-    """The name of a body without a given name; empty if there is no informative name."""
-    meshes: list[str] = []
-    only = leaves.get(BASE, ()) if pybullet.getNumJoints(id, client) == 0 else ()
-    if only:
-        seen = pybullet.getVisualShapeData(id, physicsClientId=client)
-        meshes = [each[4].decode(errors="replace") for each in seen if each[4] != b"unknown_file"]
+def _name(own: str, loaded: Loaded | None, visuals: Sequence[Visual], only: Sequence[Leaf]) -> tuple[str, str | None]:
+    """The name of a body without a given name, and the kind of its only shape. The name is empty if it says nothing.
+
+    `only` are the shapes of a body of one link.
+    """
+    meshes = [each[4].decode(errors="replace") for each in visuals if only and each[4] != b"unknown_file"]
     kind = only[0].kind.removeprefix("concave ") if len(only) == 1 else None
-    return body_name(own, loaded.file if loaded else None, loaded is None or loaded.alone, meshes, kind)
+    return body_name(own, loaded.file if loaded else None, loaded is None or loaded.alone, meshes, kind), kind
 
 
-def _colors(client: int, id: int, links: Mapping[int, str]) -> dict[int, Color]:
-    seen: dict[int, Color] = {}
-    for visual in pybullet.getVisualShapeData(id, physicsClientId=client):
-        seen.setdefault(visual[1], visual[7])
+def _colors(id: int, seen: Mapping[int, Color], links: Mapping[int, str]) -> dict[int, Color]:
     # Hues a golden ratio apart stay distinct however many bodies there are.
     own = (*colorsys.hsv_to_rgb(id * 0.618034 % 1, 0.5, 0.9), 1.0)
     fallback = next(iter(seen.values()), own)

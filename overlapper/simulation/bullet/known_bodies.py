@@ -15,6 +15,7 @@ from overlapper.simulation.bullet.lost_shapes import NOT_BUILT, lost_of
 from overlapper.simulation.bullet.recorder import Recorder
 from overlapper.simulation.bullet.saved_scene import body_ids, saved_bodies
 from overlapper.simulation.model import BASE, ModelledBody, Skipped
+from overlapper.simulation.naming import link_name
 from overlapper.simulation.settings import Modelling
 
 
@@ -117,13 +118,12 @@ class KnownBodies:
             unidentified = len(file.bodies) - len(rows)
             self.hidden = {id: rows[id] for id in hidden if id in rows}
         fresh = [id for id in ids if id not in known]
+        names = {**(self._recorder.body_names if self._recorder and fresh else {}), **self._given_names}
         for id in fresh:
             body = file.bodies[rows[id]] if id in rows else None
             field = self._recorder.height_field(id) if self._recorder else None
             loaded_from = self._recorder.loaded.get(id) if self._recorder else None
-            known[id] = read_body(
-                client, id, file, body, self._modelling, field, loaded_from, self._given_names.get(id)
-            )
+            known[id] = read_body(client, id, file, body, self._modelling, field, loaded_from, names.get(id))
             self._margins[id] = _margin(client, id)
             self._marks.put(id)
         if fresh:
@@ -140,10 +140,14 @@ class KnownBodies:
         loads = self._recorder.loaded if self._recorder else {}
         for loaded in dict.fromkeys(loads[id] for id in fresh if id in loads):
             lost, absent = lost_of(loaded, self._client, file, rows)
-            told = [(id, link, known[id].link_names[link], reason) for (id, link), reason in lost.items()]
-            told += [(loaded.bodies[0], BASE, printable(name), NOT_BUILT) for name in absent]
-            for id, link, name, reason in told:
-                known[id] = with_lost(known[id], Skipped(id, link, f"{known[id].name}/{name}", reason))
+            for (id, link), reason in lost.items():
+                links = known[id].link_names
+                name = link_name(known[id].name, links, links[link])
+                known[id] = with_lost(known[id], Skipped(id, link, name, reason))
+            for missing in absent:
+                first = known[loaded.bodies[0]]
+                skipped = Skipped(loaded.bodies[0], BASE, f"{first.name}/{printable(missing)}", NOT_BUILT)
+                known[loaded.bodies[0]] = with_lost(first, skipped)
 
     def _still_known(self) -> tuple[list[int], dict[int, ModelledBody]]:
         """The ids of all bodies, sorted, and the bodies among them that have been read."""

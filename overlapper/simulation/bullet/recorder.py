@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ import pybullet
 import pybullet_data
 from numpy.typing import ArrayLike
 
+from overlapper.printable import printable
 from overlapper.simulation.bullet.calls import Arguments, listen, unlisten
 from overlapper.simulation.bullet.commands import Commands
 from overlapper.simulation.height_field import HeightField
@@ -46,7 +48,8 @@ class Loaded(NamedTuple):
 class Recorder:
     """Notes the settings that pybullet is told and cannot be asked for later.
 
-    These are pair filters, the filter mode, self-collision, the data of height fields, and the files of bodies.
+    These are pair filters, the filter mode, self-collision, the data of height fields, and the files of bodies. If a
+    wrapper of pybullet has names for the bodies that it makes, as panda-gym has, these are noted, too.
 
         client = pybullet.connect(pybullet.DIRECT)
         recorder = Recorder(client)
@@ -88,6 +91,7 @@ class Recorder:
         """The load flags of each body that was loaded with URDF_USE_SELF_COLLISION."""
         self.loaded: dict[int, Loaded] = {}
         """The files of the bodies that loadURDF, loadSDF or loadMJCF made."""
+        self._named: list[dict[object, object]] = []  # ids by name, as wrappers of pybullet keep them
         self._search_path = ""
         self._fields: dict[int, HeightField] = {}  # by shape
         self._shapes: dict[int, int] = {}  # by body that is a height field
@@ -106,6 +110,12 @@ class Recorder:
             The noted height field.
         """
         return self._fields.get(self._shapes.get(body, -1))
+
+    @property
+    def body_names(self) -> dict[int, str]:
+        """The names of bodies by number in the wrapper of pybullet that made them."""
+        pairs = [pair for named in self._named for pair in named.items()]
+        return {body: printable(name) for name, body in pairs if isinstance(name, str) and isinstance(body, int)}
 
     def close(self) -> None:
         """Stop noting and keep the notes. After all recorders are closed, pybullet has its own functions again."""
@@ -151,6 +161,7 @@ class Recorder:
                         self._shapes[body] = arguments["baseCollisionShapeIndex"]
                     if flags & pybullet.URDF_USE_SELF_COLLISION:
                         self.self_collision[body] = flags
+                self._note_names()
             case "removeBody":
                 # Pair filters outlive the body, and apply to the next one with its id.
                 self._drop(arguments["bodyUniqueId"])
@@ -164,6 +175,13 @@ class Recorder:
             case "resetSimulation" | "disconnect":
                 self.scenes_loaded += 1
                 self._forget()
+
+    def _note_names(self) -> None:
+        """Keep the dictionary `_bodies_idx` of the object whose method has made a body. It gets the id afterwards."""
+        caller = sys._getframe(4)  # past _note, _hear and the replacement of pybullet's function
+        named = getattr(caller.f_locals.get("self"), "__dict__", {}).get("_bodies_idx")
+        if isinstance(named, dict) and not any(named is each for each in self._named):
+            self._named.append(named)
 
     def _found(self, file: str) -> Path | None:
         """The path at which pybullet has found a file, by the folders that it searches first."""

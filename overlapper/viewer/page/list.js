@@ -28,7 +28,7 @@ function grouped(some, keys) {
 
 // A link is called by its name without the name of its body. A shape has a number if there are several.
 function within(name, whole) {
-  const rest = name.startsWith(`${whole}.`) ? name.slice(whole.length + 1) : name;
+  const rest = [".", "/"].some(mark => name.startsWith(whole + mark)) ? name.slice(whole.length + 1) : name;
   return /^\d+$/.test(rest) ? `part ${rest}` : rest;
 }
 
@@ -50,7 +50,7 @@ function rowsOf(some) {
     if (!isOpen(bodies.key)) continue;
     const byLink = grouped(bodies.sightings, linkKeys);
     for (const inner of byLink) {
-      const names = JSON.parse(inner.key).map(([body, link]) => link ? `${body}.${link}` : body);
+      const names = JSON.parse(inner.key).map(([, name]) => name);
       if (inner.sightings.length === 1) {
         leaf(inner.sightings[0], 1, called);
       } else if (byLink.length === 1) {
