@@ -43,7 +43,7 @@ def draw(us: Figures, path: Path) -> None:
         bars.append(Series(places, heights, words + ", a tenth" * (divisor > 1), form, style={"color": colour}))
     top = max(max(bars[-2].y), parts.sum(0).max())
     each = Panel(
-        "Where the time of a step goes",
+        "Time of a step by part, per box",
         bars,
         {"xlabel": "boxes in the pile", "ylabel": "µs of a step, per box", "ylim": (0, 1.45 * top)},
         xticks=dict(enumerate(names)),
@@ -55,7 +55,7 @@ def draw(us: Figures, path: Path) -> None:
     ]
     scales = {"xscale": "log", "yscale": "log"}
     whole = Panel(
-        "The whole",
+        "Total time of a step",
         lines,
         {**scales, "xlabel": "boxes in the pile", "ylabel": "ms of a step"},
         xticks=dict(zip(piles, names)),
