@@ -233,7 +233,7 @@ def _not_watched(script: Path, watches: Watches, how: Mapping[str, Any], astray:
         told.append(f"{script} started {processes} pybullet: steps in other processes are not watched")
     for body, name in how["names"].items() if watches.all else ():
         if all(body in watch.unnamed for watch in watches.all):
-            told.append(f"--name {body}={name}: there is no body {body}")
+            told.append(f"--name {body}={name}: no measured step had a body {body}")
     for name in dict.fromkeys(astray):
         told.append(
             f"{name} stands after {script} and was an argument of the script: "

@@ -148,6 +148,7 @@ class Watch:
         """The files that were written, known when the watch is over."""
         self.open = True
         self._names = names
+        self._met: set[int] = set()  # the bodies of all measured steps, if there are names
         self._check = reference(check)
         self._simulation = of_engine.running(physicsClientId, recorder)
         self._bodies: AnyBodies | None = None
@@ -225,6 +226,8 @@ class Watch:
             self._bodies = self._simulation.bodies(**settings_of(self._modelling), names=self._names)
         else:
             self._bodies.update()
+        if self._names:
+            self._met.update(self._bodies.labels)
         contacts = self._bodies.overlaps(**settings_of(self._asking))
         with interrupted_later():
             if self._take is None:
@@ -241,9 +244,8 @@ class Watch:
 
     @property
     def unnamed(self) -> dict[int, str]:
-        """The names given to bodies that were not in the simulation when it was last measured."""
-        there = {body for body, _ in self._bodies.names} if self._bodies else set()
-        return {body: name for body, name in (self._names or {}).items() if body not in there}
+        """The names given to bodies that were in the simulation in no measured step."""
+        return {body: name for body, name in (self._names or {}).items() if body not in self._met}
 
     def close(self) -> None:
         """End the watch and put the files in their places. OSError if this fails.

@@ -166,7 +166,7 @@ def look(color: Color | None, shapes: Sequence[ModelledShape]) -> Look:
 
 
 def _color_word(color: Color) -> str:
-    hue, saturation, value = colorsys.rgb_to_hsv(*color[:3])
+    hue, saturation, value = colorsys.rgb_to_hsv(*np.clip(color[:3], 0, 1).tolist())
     if not color[3]:
         return ""
     if value < 0.2:

@@ -67,15 +67,15 @@ def must_be_drawn(bodies: object, contacts: object) -> None:
 
 def own_names(bodies: DrawnBodies) -> dict[tuple[int, int], tuple[str, str]]:
     """The label of the body of each link, and the name of the link without that label."""
-    return {
-        (body, link): (label, "base" if name == label else name.removeprefix(f"{label}/"))
-        for (body, link), name in bodies.names.items()
-        for label in [bodies.labels[body]]
-    }
+    names = {}
+    for (body, link), name in bodies.names.items():
+        label, unnamed = bodies.labels[body], "base" if link < 0 else str(link)
+        names[body, link] = label, unnamed if name == label else name.removeprefix(f"{label}/")
+    return names
 
 
 def in_tree(name: str) -> str:
-    """The name of a node. A slash begins a new level of the tree, so names have another one.
+    """The name as that of a node. A slash would begin a new level of the tree, so U+2215 replaces it.
 
     Names that JavaScript objects have by default are in quotes, and names that begin and end with a quote.
     """

@@ -111,7 +111,7 @@ class Recording:
         self._names: list[str] = []
         self._bodies: dict[str, tuple[bytes, str]] = {}
         self._nodes: dict[str, int] = {}
-        self._owners: list[tuple[str, str]] = []  # the label of the body of each node, and the link's own name
+        self._link_names: list[tuple[str, str]] = []  # the label of the body of each node, and the link's own name
         self._grounds: list[int] = []  # nodes
         self._poses: dict[str, tuple[float, ...]] = {}  # the last pose of each node
         self._keys: list[tuple[int, int, tuple[float, ...]]] = []  # frame, node, pose
@@ -254,7 +254,7 @@ class Recording:
             "pairs": list(self._pairs),
             "links": list(self._links.values()),
             "nodes": list(self._nodes),
-            "owners": self._owners,
+            "linkNames": self._link_names,
             "center": stage.center.tolist(),
             "size": stage.size,
             "moment": max(framing.moment, 0),
@@ -314,7 +314,7 @@ class Recording:
             self._visualizer[node].set_object(stage.body(placed, color))
             self._bodies[path] = shape, node
             self._nodes[node] = len(self._nodes)
-            self._owners.append(owner)
+            self._link_names.append(owner)
             if stage.drawing.ground(placed):
                 self._grounds.append(self._nodes[node])
         return node

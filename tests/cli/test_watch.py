@@ -311,14 +311,14 @@ def test_shapes_and_bodies_that_are_left_out_end_a_watch_with_2():
 
 
 def test_bodies_are_named_by_the_command_and_options_of_ours_behind_the_script_are_told():
-    script("steps(3); print(sys.argv)")
+    script("steps(3); p.removeBody(1); p.stepSimulation(); print(sys.argv)")
     done = watch(
         "--name", "0=table", "--name", "1=cup", "--name=9=duck", "--every", "1", "script.py", "--out=a.csv", "--every=3"
     )
     assert (done.returncode, done.stdout) == (0, "['script.py', '--out=a.csv', '--every=3']\n")
-    assert "table" in done.stderr and "cup" in done.stderr
+    assert re.search(r"^table +3 .*\n cup +$", done.stderr, re.MULTILINE)
     assert done.stderr.splitlines()[-2:] == [
-        "overlapper: --name 9=duck: there is no body 9",
+        "overlapper: --name 9=duck: no measured step had a body 9",
         "overlapper: --out stands after script.py and was an argument of the script: "
         "options of overlapper watch stand before the script",
     ]

@@ -75,7 +75,9 @@ class Bodies(AnyBodies):
     the modelled ones as read.
 
     Bodies without a name in `names` are called by the stem of their file, which a recorder hears, by the name of their
-    robot, or by their mesh or kind of shape. The most informative name is taken.
+    robot, or by their mesh. The most informative name is taken. Other bodies of one shape are called by its kind, with
+    colour and size if these tell them apart: "red box 0.1 m". If a recorder has heard an object that makes bodies and
+    keeps their names in a dictionary `_bodies_idx`, as panda-gym does, these names come first.
 
     If a body collides with itself and no recorder has heard of it, pybullet's contact points show it. overlaps() then
     gives one SelfCollisionWarning.

@@ -23,7 +23,7 @@ follows();
 
 // Bodies, their links, and the nodes of the tree that are drawn for them.
 const tree = new Map();
-film.owners.forEach(([body, link], node) => {
+film.linkNames.forEach(([body, link], node) => {
   if (!tree.has(body)) tree.set(body, new Map());
   if (!tree.get(body).has(link)) tree.get(body).set(link, []);
   tree.get(body).get(link).push(node);
