@@ -1275,7 +1275,7 @@ class ContactSolver:
         `duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.
         """
 
-    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike, distributed: bool, ahead: Sequence[Any] | None = None) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int]:
+    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike, distributed: bool, ahead: Sequence[Any] | None = None) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int, float]:
         """
         The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
         without the patches; rows that are `damped` choose stability over energy. `ahead` has a pair for each link: the position
@@ -1284,7 +1284,8 @@ class ContactSolver:
 
         (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
         last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and
-        how often the patches were gone through.
+        how often the patches were gone through, and the largest change of a slip in the last time, as a fraction of the largest
+        slip.
         """
 
 def function(core: Any) -> Any:

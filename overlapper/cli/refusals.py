@@ -15,7 +15,7 @@ from typing import BinaryIO, NoReturn, TextIO
 from overlapper.jobs.worker import NotStarted
 from overlapper.printable import first_line, printable
 from overlapper.scenes.scene import SceneError, engine_in, find_scene
-from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning, UnknownBodyWarning
+from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning, UnknownBodyWarning, UnsettledWarning
 from overlapper.simulation.engine import engine
 
 LIBC = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
@@ -86,7 +86,8 @@ def quiet() -> Iterator[BinaryIO]:
 
 def _tell_some_warnings() -> None:
     """Write warnings of volumetric contact, and of names without a body, to stderr, a sentence each."""
-    told, others = (NoDirectionWarning, SubstepsWarning, UnknownBodyWarning), warnings.showwarning
+    told = NoDirectionWarning, SubstepsWarning, UnknownBodyWarning, UnsettledWarning
+    others = warnings.showwarning
     for category in told:
         warnings.simplefilter("always", category)
 

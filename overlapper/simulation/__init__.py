@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         SkippedShapeWarning,
         SubstepsWarning,
         UnknownBodyWarning,
+        UnsettledWarning,
     )
     from overlapper.simulation.contacts import Contact, Contacts
     from overlapper.simulation.forces.contact import VolumetricContact
@@ -48,6 +49,7 @@ __all__ = [
     "SubstepsWarning",
     "Surface",
     "UnknownBodyWarning",
+    "UnsettledWarning",
     "VolumetricContact",
     "link_contacts",
 ]
@@ -67,6 +69,7 @@ __getattr__ = lazily(
             "SkippedShapeWarning",
             "SubstepsWarning",
             "UnknownBodyWarning",
+            "UnsettledWarning",
         ),
         "forces.contact": ("VolumetricContact",),
         "forces.forces": ("Forces",),

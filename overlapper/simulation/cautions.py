@@ -17,5 +17,9 @@ class NoDirectionWarning(UserWarning):
     """A body lies within another or goes through it, so their overlap has no side to push to."""
 
 
+class UnsettledWarning(UserWarning):
+    """The solver of contact forces has ended before they were accurate."""
+
+
 class SubstepsWarning(UserWarning):
     """The substeps are too few for the stiffness: contacts lose energy."""

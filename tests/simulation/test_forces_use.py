@@ -3,6 +3,7 @@
 import contextlib
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pybullet as p
@@ -11,7 +12,8 @@ from contact_experiments import HALF, STEP, G, World, run
 from simulated import box, ground, jointed
 
 import overlapper
-from overlapper.simulation import Bodies, Recorder, SubstepsWarning, VolumetricContact
+from overlapper.simulation import Bodies, Recorder, SubstepsWarning, UnsettledWarning, VolumetricContact
+from overlapper.simulation.forces import told
 
 
 @pytest.fixture
@@ -502,3 +504,21 @@ def test_a_warning_within_step_simulation_names_the_line_that_calls_it(world):
     with world.contact(stiffness=1e12, substeps=1), pytest.warns(SubstepsWarning) as caught:
         p.stepSimulation(world.client)
     assert caught[0].filename == __file__
+
+
+def test_forces_that_have_not_settled_are_reported_once(world, monkeypatch):
+    resting(world)
+    world.box(*[HALF] * 3, position=[0, 0, 3 * HALF - 1e-3], mass=10)
+    with world.contact(substeps=1) as contact:
+        contact.step()
+        assert 0 < contact.residual <= 1e-8 and repr(contact.last).endswith("N at most)")
+        monkeypatch.setattr(told, "SETTLED", contact.residual / 1e3)
+        with pytest.warns(UnsettledWarning) as caught:
+            contact.step()
+        contact.step()
+    assert contact.mean().residual == contact.residual
+    words = (
+        r"contact forces are inaccurate in some steps: the solver ended after \d+ sweeps, while slips still changed by"
+    )
+    assert re.match(words, str(caught[0].message)) and caught[0].filename == __file__
+    assert ", residual 2e-05)" in repr(replace(contact.last, residual=2e-5))

@@ -296,6 +296,7 @@ class Solution:
     on_links: np.ndarray
     acceleration: np.ndarray
     sweeps: int
+    residual: float
 
     @property
     def velocity(self) -> np.ndarray:

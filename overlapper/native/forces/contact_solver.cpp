@@ -8,7 +8,8 @@
 namespace overlapper {
 namespace {
 
-/// Sweeps end when no slip changes by more than this fraction of the largest slip without forces.
+/// Sweeps end when no slip changes by more than this fraction of the largest slip without forces, or of the largest
+/// change of a sweep.
 constexpr double kSettled = 1e-8;
 
 /// The most visits of patches in a step. The number of sweeps stays between kFewest and kMost.
@@ -320,21 +321,24 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   }
   for (int i = 0; i < count; ++i) push(rows_[i], laws[i].wrench, h, velocity);
   int sweeps = 0;
+  double changed = 0;
   Momentum momentum;
   for (const int most = std::clamp(kVisits / std::max(1, count), kFewest, kMost); sweeps < most && count > 0;) {
     // Sweeps go there and back, so that a push at one end of a stack soon reaches the other end.
-    double changed = 0;
+    changed = 0;
     for (int k = 0; k < count; ++k) {
       const int i = sweeps % 2 ? count - 1 - k : k;
       changed = std::max(changed, visit(i, laws[i], h, velocity));
     }
     ++sweeps;
+    largest = std::max(largest, changed);  // bodies may be at rest until they are pushed
     if (changed <= kSettled * largest) break;
     const bool there_and_back = sweeps >= kPlain && sweeps % 2 == 0 && sweeps + 2 <= most;
     if (there_and_back && step.friction == Friction::kEllipsoid) extrapolate(momentum, laws, h, velocity);
   }
   Solution solution = solved(laws, velocity);
   solution.sweeps = sweeps;
+  solution.residual = changed > 0 ? changed / largest : 0;
   remember(solution, laws, h);
   return solution;
 }

@@ -47,6 +47,7 @@ class ContactSolver {
     std::vector<std::array<Vec3, 2>> links;  ///< force and torque on each link, about its centre of mass
     std::vector<double> acceleration;        ///< of all coordinates, by the patches
     int sweeps = 0;
+    double residual = 0;  ///< the largest change of a slip in the last sweep, over the largest slip
   };
 
   /// Solves a step with the patches as they were placed.

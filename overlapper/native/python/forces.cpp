@@ -146,7 +146,8 @@ nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_give
   return nb::make_tuple(array(force), array(torque), array(slip), array(normal),
                         Flags(reinterpret_cast<const bool*>(flags->data()), {count}, owner),
                         to_numpy<Matrix>(std::move(links), {rows, 6}),
-                        to_numpy<Vector>(std::move(solution.acceleration), {coordinates}), solution.sweeps);
+                        to_numpy<Vector>(std::move(solution.acceleration), {coordinates}), solution.sweeps,
+                        solution.residual);
 }
 
 /// The poses of shapes after `duration` at the present velocities of their links.
@@ -243,7 +244,7 @@ stiffness in Pa/m, dissipation in s, and the coefficient of friction. The answer
               "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], "
-              "numpy.typing.NDArray[numpy.float64], int]"),
+              "numpy.typing.NDArray[numpy.float64], int, float]"),
       R"(The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
 without the patches; rows that are `damped` choose stability over energy. `ahead` has a pair for each link: the position
 of its centre of mass after the step, in m, if the coordinates keep their velocity, and the quaternion xyzw of its rotation
@@ -251,7 +252,8 @@ until then. It is needed for the trees of a simulator.
 
 (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
 last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and
-how often the patches were gone through.)");
+how often the patches were gone through, and the largest change of a slip in the last time, as a fraction of the largest
+slip.)");
 }
 
 }  // namespace overlapper::python

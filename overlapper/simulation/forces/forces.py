@@ -43,6 +43,9 @@ class Forces(Tabular):
         False where the overlap has no direction. `normal` is then the last known one.
     stiffness : (p,) ndarray
         In Pa/m.
+    residual : float, default 0
+        How much the solver still changed a slip when it ended, as a fraction of the largest slip. It is at most 1e-8 if
+        the forces are settled. In a mean, it is the largest of all substeps.
     """
 
     contacts: Contacts
@@ -52,6 +55,7 @@ class Forces(Tabular):
     normal: Array
     directed: NDArray[np.bool_]
     stiffness: Array
+    residual: float = 0.0
 
     @property
     def pairs(self) -> NDArray[np.int64]:
@@ -148,7 +152,10 @@ class Forces(Tabular):
         return len(self.force)
 
     def __repr__(self) -> str:
-        return f"Forces({len(self)} pairs, {np.linalg.norm(self.force, axis=1).max(initial=0.0):.3g} N at most)"
+        settled = "" if self.residual <= 1e-8 else f", residual {self.residual:.0e}"
+        return (
+            f"Forces({len(self)} pairs, {np.linalg.norm(self.force, axis=1).max(initial=0.0):.3g} N at most{settled})"
+        )
 
 
 def mean(contacts: Contacts, parts: Sequence[tuple[float, Forces]], stiffness: Array) -> Forces:
@@ -176,7 +183,8 @@ def mean(contacts: Contacts, parts: Sequence[tuple[float, Forces]], stiffness: A
             slip[now] = forces.slip[then]
             lost = ~directed[now]
             normal[now[lost]] = forces.normal[then[lost]]
-    return Forces(contacts, force, torque, slip, normal, directed, stiffness)
+    residual = max((forces.residual for _, forces in parts), default=0.0)
+    return Forces(contacts, force, torque, slip, normal, directed, stiffness, residual)
 
 
 def _codes(found: Overlaps, count: int) -> NDArray[np.int64]:

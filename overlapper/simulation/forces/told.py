@@ -10,9 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.simulation.bodies import AnyBodies
-from overlapper.simulation.cautions import NoDirectionWarning, SkippedShapeWarning, SubstepsWarning
+from overlapper.simulation.cautions import (
+    NoDirectionWarning,
+    SkippedShapeWarning,
+    SubstepsWarning,
+    UnsettledWarning,
+)
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.model import Array, LinkKey
+
+# A larger residual of the solver is worth a warning.
+SETTLED = 1e-3
 
 
 class Told:
@@ -27,6 +35,7 @@ class Told:
         self._bodies = bodies
         self._known: set[tuple[type[Warning], LinkKey, LinkKey]] = set()
         self._lost: set[int] = set()
+        self._unsettled = False
 
     def of_substeps(
         self, contacts: Contacts, damped: NDArray[np.bool_], frequency2: Array, duration: float, substeps: int
@@ -49,6 +58,17 @@ class Told:
                 f"{a} and {b} overlap without a direction of force, because one lies within the other "
                 "or goes through it; the force keeps its last direction",
                 NoDirectionWarning,
+                stacklevel=4 + self.further,
+            )
+
+    def of_residual(self, residual: float, sweeps: int) -> None:
+        """Warn once of forces that are not `SETTLED`."""
+        if residual > SETTLED and not self._unsettled:
+            self._unsettled = True
+            warnings.warn(
+                f"contact forces are inaccurate in some steps: the solver ended after {sweeps} sweeps, while slips "
+                f"still changed by {residual:.1e} of the largest slip; `residual` has this number for each step",
+                UnsettledWarning,
                 stacklevel=4 + self.further,
             )
 

@@ -269,7 +269,7 @@ def test_a_contact_keeps_its_place_or_goes_on_with_the_body(staying):
 
 
 def told(solution):
-    names = ("force", "torque", "slip", "normal", "directed", "on_links", "acceleration", "sweeps")
+    names = ("force", "torque", "slip", "normal", "directed", "on_links", "acceleration", "sweeps", "residual")
     return dict(zip(names, solution, strict=True))
 
 
@@ -288,7 +288,7 @@ def test_a_step_like_the_last_begins_with_the_solution_of_the_last(seed):
     again = copy.solve(
         drawn.duration, drawn.velocity, drawn.acceleration, np.full(len(drawn.pairs), drawn.damped), False
     )
-    assert again[-1] <= 2 < cold
+    assert again[-2] <= 2 < cold
     assert again[0][::-1] == pytest.approx(first.force, rel=1e-4, abs=1e-4 * np.abs(first.force).max())
     empty = replace(drawn, pairs=[])
     assert empty.solve().sweeps == 0 and not empty.solve().acceleration.any()
@@ -299,7 +299,9 @@ SWEEPS = [4, 5, 5, 3, 6, 4, 5, 5, 4, 5, 4, 5]
 
 def test_scenes_at_random_are_solved_in_as_many_sweeps_as_before():
     """Sweeps end when no slip changes by more than a fraction of the largest."""
-    assert [scene(seed, stiffness=1e5, friction=0.5).solve().sweeps for seed in range(12)] == SWEEPS
+    found = [scene(seed, stiffness=1e5, friction=0.5).solve() for seed in range(12)]
+    assert [each.sweeps for each in found] == SWEEPS
+    assert all(0 <= each.residual <= 1e-8 for each in found)
 
 
 def stack(count, **given):
@@ -314,9 +316,17 @@ def stack(count, **given):
     return Scene(links, shapes, range(count + 1), pairs, stiffness=1e9, acceleration=weight, **given)
 
 
-@pytest.mark.parametrize(("count", "sweeps"), [(4, 2000), (8, 1250), (30, 333), (1200, 10)])
-def test_sweeps_end_after_ten_thousand_visits_but_not_before_ten_sweeps_nor_after_two_thousand(count, sweeps):
-    assert stack(count).solve().sweeps == sweeps
+@pytest.mark.parametrize("count", [4, 8, 30])
+def test_a_stack_settles_from_rest(count):
+    """Its slips are measured by what the forces do to them, as none of them is known without forces."""
+    found = stack(count).solve()
+    assert found.sweeps < 200 and 0 < found.residual <= 1e-8
+
+
+@pytest.mark.parametrize(("count", "sweeps"), [(300, 33), (1200, 10)])
+def test_sweeps_end_after_ten_thousand_visits_but_not_before_ten_sweeps(count, sweeps):
+    found = stack(count).solve()
+    assert found.sweeps == sweeps and found.residual > 1e-8
 
 
 def foot(seed):
@@ -338,6 +348,12 @@ def test_patches_of_a_body_that_cannot_all_stick_are_solved_by_extrapolation(see
     """Without extrapolation, five of these scenes use all 2,000 sweeps."""
     solution = foot(seed).solve()
     assert solution.sweeps < 1200 and broken_laws(solution, 1e-6) == []
+
+
+def test_sweeps_end_after_two_thousand():
+    """Friction at points is not extrapolated."""
+    solution = replace(foot(0), distributed=True).solve()
+    assert solution.sweeps == 2000 and solution.residual > 1e-8
 
 
 @pytest.mark.parametrize("direction", [(1, 0, 0), (0, 1, 0), (0.6, 0.8, 0)])

@@ -46,7 +46,7 @@ def test_the_pressure_at_the_end_of_a_step_is_that_of_the_velocity_there(damped,
     solver, _ = placed(depth, dissipation)
     velocity, weight = np.zeros(12), np.zeros(12)
     velocity[8], weight[8] = -approach, -G
-    force, *_, wrenches, ours, _sweeps = solver.solve(h, velocity, weight, np.array([damped]), False)
+    force, *_, wrenches, ours, _sweeps, _residual = solver.solve(h, velocity, weight, np.array([damped]), False)
     lag = (h if damped else h / 4) + dissipation
     ahead = lag * (approach + h * G) - (0 if damped else h / 4 * approach)
     expected = max(0, STIFFNESS * area * (depth + ahead) / (1 + STIFFNESS * area * h * lag))
@@ -111,7 +111,7 @@ def test_links_of_one_tree_push_each_other_through_their_common_masses():
     tree.move(up, still, still, inverse)
     placed(1e-4, solver=tree)
     ahead = [((0, 0, 0), TURN), ((0, 0, HALF - 1e-4), TURN)]
-    force, *_, ours, _sweeps = tree.solve(1e-3, [0, 0], [0, 0], [False], False, ahead)
+    force, *_, ours, _sweeps, _residual = tree.solve(1e-3, [0, 0], [0, 0], [False], False, ahead)
     pressing = -force[0, 2]
     assert pressing > 9 and ours == pytest.approx([-pressing / 3, pressing * (1 + 1 / 3)], rel=1e-12)
 
