@@ -497,7 +497,8 @@ def test_a_run_that_lacks_something_costs_no_earlier_file_and_says_what_it_lacks
 def test_names_reach_no_terminal_with_their_escapes(tmp_path):
     link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
     link += '<collision><geometry><box size="1 1 1"/></geometry></collision>'
-    (tmp_path / "red.urdf").write_text(f'<robot name="r\x1b[31m"><link name="a\x1b[31mred">{link}</link></robot>')
+    tip = '<link name="tip"/><joint name="j" type="fixed"><parent link="a\x1b[31mred"/><child link="tip"/></joint>'
+    (tmp_path / "red.urdf").write_text(f'<robot name="r\x1b[31m"><link name="a\x1b[31mred">{link}</link>{tip}</robot>')
     (tmp_path / "red.py").write_text(
         'PAIRS = "all"\nSTEPS = 1\nimport pybullet as p\n'
         "def build(client):\n    for _ in range(2): p.loadURDF('red.urdf', physicsClientId=client)\n"

@@ -56,7 +56,7 @@ def test_a_scene_is_run():
     assert found[5][1] == [sunk(5).volume] and found[8][1] == [sunk(8).volume]
     (deeper,) = run(load_scene("sinking.py", {"sinks": "0.03"}), only={5})
     assert deeper.contacts[0].overlap.volume > sunk(5).volume
-    assert deeper.bodies.names == {(0, -1): "cube/base", (1, -1): "ball/base"}
+    assert deeper.bodies.names == {(0, -1): "cube", (1, -1): "ball"}
     assert link_contacts(deeper.contacts)[0].volume == deeper.contacts[0].overlap.volume
 
 
@@ -73,7 +73,7 @@ def test_a_loop_is_logged():
             log.add(bodies.overlaps())
     rows = read_table(Path("own.csv"))
     assert [(row["step"], row["time_s"], row["nameA"]) for row in rows] == [
-        (step, pytest.approx(0.01 * step), "ball/base") for step in range(1, 4)
+        (step, pytest.approx(0.01 * step), "ball") for step in range(1, 4)
     ]
     assert rows[0]["volume_m3"] < rows[2]["volume_m3"]
     assert "pybullet" not in read_metadata(Path("own.csv"))
@@ -92,7 +92,7 @@ def test_steps_of_others_are_watched():
     assert (watch.steps, watch.measured, watch.time) == (20, 20, pytest.approx(0.2))
     assert watch.written == [Path("run.csv"), Path("run.html")]
     assert "pybullet" not in read_metadata(Path("run.csv"))
-    assert {row["nameB"] for row in read_table(Path("run.csv"))} == {"cube/base"}
+    assert {row["nameB"] for row in read_table(Path("run.csv"))} == {"cube"}
     assert "cube" in Path("run.html").read_text()
     (pair,) = watch.summary.pairs.values()
     assert pair.volume == pytest.approx(overlap(Sphere(0.1), Placed(Box([0.1] * 3), (0, 0, -0.05))).volume)

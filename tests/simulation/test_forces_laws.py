@@ -317,7 +317,7 @@ def test_a_body_that_gets_within_another_is_pushed_as_it_was_last(client):
         p.resetBasePositionAndOrientation(small, [0.1, 0.2, 0.05], [0, 0, 0, 1], client)
         p.resetBaseVelocity(small, [0, 0, 0], [0, 0, 0], client)
         said = (
-            r"^box#0 and box#1 overlap without a direction of force, because one lies within the other or "
+            r"^box 1 m and box 0.2 m overlap without a direction of force, because one lies within the other or "
             r"goes through it; the force keeps its last direction$"
         )
         with pytest.warns(NoDirectionWarning, match=said) as told:

@@ -75,9 +75,9 @@ def test_a_body_without_a_finite_velocity_has_no_contacts_and_the_others_go_on(c
         if lost:
             words = [str(each.message) for each in told]
             assert len(words) == 2 and words[0].startswith(
-                "box#3 (body 3, link -1) has no contacts, because its velocity is not finite"
+                "box 0.1 m#3 (body 3, link -1) has no contacts, because its velocity is not finite"
             )
-            assert words[1].startswith("box#3 (body 3, link -1) is left out")
+            assert words[1].startswith("box 0.1 m#3 (body 3, link -1) is left out")
             assert pairs == [[0, 1]] and contact.on(3)[0].tolist() == [0, 0, 0]
             assert [each.body for each in contact.bodies.skipped if each.diverged] == [3]
         else:
