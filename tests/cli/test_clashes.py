@@ -140,7 +140,7 @@ def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path):
     code, found = facts("left", "right/cube.stl", "left/cube.stl", "--html", "page.html")
     assert code == 1
     assert [body["name"] for body in found["bodies"]] == ["left/cube.stl", "right/cube.stl"]
-    assert Film.of(tmp_path / "page.html").heading["pairs"] == [["left.cube.stl", "right.cube.stl"]]
+    assert Film.of(tmp_path / "page.html").heading["pairs"] == [["left/cube.stl", "right/cube.stl"]]
 
 
 def test_other_files_of_a_folder_are_ignored(tmp_path):

@@ -153,7 +153,7 @@ def test_the_plane_of_a_ground_faces_the_scene_fades_out_and_ends_with_the_groun
         recording.add(scene, [], 0.0)
         page = recording.save(tmp_path / f"{name}.html")
         assert Film.of(page).heading["grounds"] == [0]
-        drawing = drawings(page)["/overlapper/bodies/body0/link-1/0"]
+        drawing = drawings(page)["/overlapper/bodies/body0/base/0"]
         assert "ff0000" not in json.dumps([f"{each['color']:06x}" for each in drawing["materials"]])
         mesh, grid = (each["data"]["attributes"] for each in drawing["geometries"])
         for part in (mesh, grid):
@@ -228,4 +228,4 @@ def test_a_live_view_is_not_made_to_fit_a_ground_either():
         bodies = Scene({0: SLAB, 1: Placed(Box([0.1, 0.1, 0.1]), (0, 0, 0.3))})
         viewer.show(bodies, bodies.contacts())
         assert viewer._stage.size == pytest.approx(np.linalg.norm([0.2] * 3))
-        assert "/overlapper/bodies/body0/link-1/0" in viewer._shapes
+        assert "/overlapper/bodies/body0/base/0" in viewer._shapes

@@ -127,6 +127,7 @@ def _of_bullet_file(path: Path, modelling: Modelling) -> Inventory:
     from overlapper.simulation.bullet.bullet_file import BulletFile
     from overlapper.simulation.collision_rules import Colliders, MaskRules, partners
     from overlapper.simulation.modelling import in_one_sentence, modelled
+    from overlapper.simulation.naming import link_name
 
     file = BulletFile(path)
     colliders = {
@@ -134,7 +135,10 @@ def _of_bullet_file(path: Path, modelling: Modelling) -> Inventory:
         for number, body in enumerate(file.bodies)
         for link, collider in sorted(body.colliders.items())
     }
-    names = {(body, link): f"body {body}/{f'link {link}' if link >= 0 else 'base'}" for body, link in colliders}
+    names: dict[tuple[int, int], str] = {}
+    for number, body in enumerate(file.bodies):
+        links = {link: f"link {link}" if link >= 0 else "base" for link in body.colliders}
+        names |= {(number, link): link_name(f"body {number}", links, name) for link, name in links.items()}
     listed: Listed = {}
     skipped, decomposed = [], []
     for key, collider in colliders.items():
