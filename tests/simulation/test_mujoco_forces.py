@@ -347,6 +347,18 @@ def test_contacts_are_off_within_the_block_and_come_back_after_an_exception():
         contact.step()
 
 
+def test_sensors_of_contacts_are_named_once():
+    sensor = '<site name="skin" type="box" size=".06 .06 .06"/>'
+    rest = '<sensor><touch name="press" site="skin"/><touch site="skin"/><gyro site="skin"/></sensor>'
+    model, data = simulated(free('<geom type="box" size=".05 .05 .05"/>' + sensor, "0 0 .0499"), rest=rest)
+    contact = VolumetricContact(Bodies(model, data))
+    with pytest.warns(UserWarning, match="so these sensors read 0: press, sensor 1$") as told, contact:
+        contact.step()
+    assert len(told) == 1 and told[0].filename == __file__ and not data.sensordata[:2].any()
+    with contact:  # warnings are errors here
+        contact.step()
+
+
 def test_flags_that_a_script_has_set_stay():
     model, data = resting_cube()
     gravity = int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from _ctypes import CFuncPtr
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -10,6 +11,7 @@ from weakref import WeakKeyDictionary
 import mujoco
 import numpy as np
 
+from overlapper.printable import printable
 from overlapper.simulation.model import Array, LinkKey
 from overlapper.simulation.mujoco.calls import stepped, unheard
 from overlapper.simulation.mujoco.dynamics import MujocoDynamics
@@ -17,6 +19,7 @@ from overlapper.simulation.mujoco.geoms import collidable
 from overlapper.simulation.mujoco.pair_rule import PairRule
 from overlapper.simulation.mujoco.silence import end_silence, silence, silenced
 
+OF_CONTACTS = int(mujoco.mjtSensor.mjSENS_TOUCH), int(mujoco.mjtSensor.mjSENS_CONTACT)
 EULER, SLEEP = mujoco.mjtIntegrator.mjINT_EULER, int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 _inside: WeakKeyDictionary[Any, MujocoStepping] = WeakKeyDictionary()
@@ -50,6 +53,7 @@ class MujocoStepping:
         self.wrenches = np.zeros((model.nbody, 6))
         self.acceleration = np.zeros(model.nv)
         self._answer: Callable[[], None] = _nothing
+        self._sensors_told = False
         self._by_hand = False  # within a step that `prepare` and `step` make
         self._given: tuple[Array, Array] | None = None  # the script's xfrc_applied, and the same with our forces
         self._must_be_supported()
@@ -65,6 +69,7 @@ class MujocoStepping:
             raise RuntimeError("data already has an active VolumetricContact: leave its `with` block first")
         self._must_be_supported()
         self.turn_off(pairs)
+        self._tell_of_sensors()
         if not _inside:
             before = mujoco.get_mjcb_control()
             if isinstance(before, CFuncPtr):
@@ -88,6 +93,15 @@ class MujocoStepping:
                 f"pairs must contain all pairs that MuJoCo lets collide, but it leaves out {missing}: "
                 "MuJoCo's contacts can only be turned off for all pairs at once"
             )
+
+    def _tell_of_sensors(self) -> None:
+        """Warn once of the sensors that read 0 without MuJoCo's contacts. The line of the `with` is named."""
+        sensors = np.flatnonzero(np.isin(self.model.sensor_type, OF_CONTACTS)).tolist()
+        if not sensors or self._sensors_told:
+            return
+        self._sensors_told = True
+        names = ", ".join(printable(self.model.sensor(k).name) or f"sensor {k}" for k in sensors)
+        warnings.warn(f"VolumetricContact replaces MuJoCo's contacts, so these sensors read 0: {names}", stacklevel=4)
 
     def leave(self) -> None:
         global _before
