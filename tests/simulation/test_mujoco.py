@@ -1,5 +1,6 @@
 """The geoms of MuJoCo models: shapes, poses, pairs, scenes, logs and watches."""
 
+import ctypes
 import json
 import subprocess
 import sys
@@ -246,6 +247,33 @@ def test_pairs_are_exactly_those_that_mj_collision_looks_at(seeds):
         assert bodies.report().pairs_possible == len(looked_at)
 
 
+def test_a_contact_filter_in_python_decides_as_in_mj_collision():
+    """With a filter, mj_collision asks the masks of bodies, and of geoms only whether there is a mask."""
+    discarded = 0
+    for seed in range(1200, 1230):
+        model = tree(seed)
+        model.geom_gap[:] = model.pair_gap[:] = 1e3
+        data = mujoco.MjData(model)
+        mujoco.mj_setConst(model, data)
+        mujoco.mj_forward(model, data)
+        bodies = Bodies(model, data)
+        before = bodies.link_pairs()
+        mujoco.set_mjcb_contactfilter(lambda m, d, a, b: int((7 * a + 13 * b) % 3 == 0))
+        try:
+            mujoco.mj_forward(model, data)
+            bodies.update()
+            asked = {tuple(sorted((a[1], b[1]))) for a, b in bodies.link_pairs()}
+            assert asked == pairs_of_mujoco(data, lambda each: True), seed
+            bodies.overlaps()
+            assert bodies.report().pairs_possible == len(asked)
+            discarded += len({tuple(sorted((a[1], b[1]))) for a, b in before} - asked)
+        finally:
+            mujoco.set_mjcb_contactfilter(None)
+        bodies.update()
+        assert bodies.link_pairs() == before
+    assert discarded > 100
+
+
 def test_overlapping_pairs_are_those_with_a_negative_distance():
     met = 0
     for seed in range(30):
@@ -277,9 +305,10 @@ def test_flags_filters_and_masks_are_followed():
     assert len(bodies.overlaps(pairs="all")) == 3  # the leg lies in the capsule of its parent
     assert [each.geomB for each in bodies.overlaps(pairs=[("world", "torso/geom 2")])] == [2]
     assert [each.geomB for each in bodies.overlaps(pairs=("leg", "world"))] == [3]
-    mujoco.set_mjcb_contactfilter(lambda m, d, a, b: 0)
+    kind = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int, ctypes.c_int)
+    mujoco.set_mjcb_contactfilter(kind(lambda m, d, a, b: 0))
     try:
-        with pytest.warns(UserWarning, match="set a contact filter"):
+        with pytest.warns(UserWarning, match="set a function of C"):
             bodies.overlaps()
         bodies.overlaps()  # says no more
     finally:

@@ -62,8 +62,8 @@ class Bodies(AnyBodies):
     `update()` reads the poses of `data`. After mj_step these are the poses before its integration, as in
     `data.contact`. mj_kinematics brings them up to date. Edited sizes, types and meshes of geoms are noticed.
 
-    Pairs are those that mj_collision looks at, by masks, welds, parents, excludes, explicit pairs and flags at the last
-    update. `pairs` and `overlaps` take other choices.
+    Pairs are those that mj_collision looks at, by masks, welds, parents, excludes, explicit pairs, flags and a
+    contact filter in Python, at the last update. `pairs` and `overlaps` take other choices.
     """
 
     def __init__(

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.simulation.mujoco.pair_rule import NO_CONTACTS, PairRule
+from overlapper.simulation.mujoco.pair_rule import NO_CONTACTS, PairRule, contact_filter
 
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 FAR = 1e10  # m; mj_geomDistance searches as far as this
@@ -24,7 +24,7 @@ def own_distances(model: Any, data: Any, pairs: NDArray[np.int64]) -> tuple[NDAr
     for geoms, distance in zip(np.sort(data.contact.geom, axis=1).tolist(), data.contact.dist.tolist()):
         least[tuple(geoms)] = min(distance, least.get(tuple(geoms), distance))
     distances = np.array([_signed_distance(model, data, *pair) for pair in pairs.tolist()], dtype=float)
-    untested = np.where(_tested(model, pairs), 0.0, distances).tolist()
+    untested = np.where(_tested(model, data, pairs), 0.0, distances).tolist()
     asked = map(tuple, np.sort(pairs, axis=1).tolist())
     return np.array([least.get(pair, other) < 0 for pair, other in zip(asked, untested)], dtype=bool), distances
 
@@ -35,9 +35,9 @@ def _signed_distance(model: Any, data: Any, first: int, second: int) -> float:
     return float(depth if depth < 0 else mujoco.mj_geomDistance(model, data, first, second, FAR, None))
 
 
-def _tested(model: Any, pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _tested(model: Any, data: Any, pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(n,) whether MuJoCo tests these pairs for contacts in any case."""
     off, on = int(model.opt.disableflags) & NO_CONTACTS, int(model.opt.enableflags) & SLEEP
-    if off or on or mujoco.get_mjcb_contactfilter() is not None:
+    if off or on or mujoco.get_mjcb_contactfilter() is not contact_filter():
         return np.zeros(len(pairs), dtype=bool)
-    return PairRule(model, np.arange(model.ngeom)).allow(*pairs.T)
+    return PairRule(model, data, np.arange(model.ngeom)).allow(*pairs.T)

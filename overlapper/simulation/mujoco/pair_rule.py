@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from _ctypes import CFuncPtr
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -22,6 +24,8 @@ def in_force(model: Any) -> bytes:
     arrays = (
         model.geom_contype,
         model.geom_conaffinity,
+        model.body_contype,
+        model.body_conaffinity,
         model.geom_type,
         model.pair_geom1,
         model.pair_geom2,
@@ -31,21 +35,34 @@ def in_force(model: Any) -> bytes:
     return b"".join(each.tobytes() for each in arrays)
 
 
+def contact_filter() -> Callable[[Any, Any, int, int], int] | None:
+    """The contact filter that was set with mujoco.set_mjcb_contactfilter, if it is a function of Python."""
+    found: Any = mujoco.get_mjcb_contactfilter()
+    return None if isinstance(found, CFuncPtr) else found
+
+
 class PairRule:
     """Which pairs of these geoms may collide, by index into `geoms`.
 
     A pair may collide if the mask of one geom admits the other, if they are not welded together or both fixed, if
     neither is the other's parent, and if their bodies are not excluded. An explicit pair may collide in any case.
     Nothing collides while contacts or constraints are disabled. See mj_collision in engine_collision_driver.c.
+
+    With a contact filter, the masks of the bodies decide instead of those of the geoms, and then the filter.
     """
 
-    def __init__(self, model: Any, geoms: NDArray[np.int64]) -> None:
+    def __init__(self, model: Any, data: Any, geoms: NDArray[np.int64]) -> None:
         body = model.geom_bodyid[geoms].astype(np.int64)
         weld = model.body_weldid[body].astype(np.int64)
         self._body, self._weld = body, weld
         self._parent = model.body_weldid[model.body_parentid[weld]].astype(np.int64)
         self._fixed = model.body_dofnum[weld] == 0
         self._group, self._mask = model.geom_contype[geoms].copy(), model.geom_conaffinity[geoms].copy()
+        self._geoms, self._model, self._data, self._filter = geoms.tolist(), model, data, contact_filter()
+        if self._filter:
+            on = (self._group | self._mask) != 0
+            self._group = np.where(on, model.body_contype[body], 0)
+            self._mask = np.where(on, model.body_conaffinity[body], 0)
         self._surface = np.isin(model.geom_type[geoms], (PLANE, HFIELD))
         flags = asked_flags(model)
         self._by_parent = not flags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
@@ -57,7 +74,7 @@ class PairRule:
         known = (first >= 0) & (second >= 0)
         self._explicit = np.unique(self._code(np.minimum(first, second)[known], np.maximum(first, second)[known]))
         count = len(geoms)
-        all_pairs = np.indices((count, count)).reshape(2, -1) if count <= TABLED else None
+        all_pairs = np.indices((count, count)).reshape(2, -1) if count <= TABLED and not self._filter else None
         self._table = None if all_pairs is None else self._decide(*all_pairs).reshape(count, count)
 
     def allow(self, first: Indices, second: Indices) -> Mask:
@@ -76,6 +93,10 @@ class PairRule:
         if len(self._excluded):
             a, b = self._body[first], self._body[second]
             allowed &= ~np.isin((np.minimum(a, b) << 16) + np.maximum(a, b), self._excluded)
+        if self._filter:
+            for k in np.flatnonzero(allowed).tolist():
+                a, b = self._geoms[first[k]], self._geoms[second[k]]
+                allowed[k] = not self._filter(self._model, self._data, a, b)
         if len(self._explicit):
             allowed |= np.isin(self._code(np.minimum(first, second), np.maximum(first, second)), self._explicit)
         # Two planes, two height fields, or one of each have no contacts.

@@ -12,7 +12,7 @@ from overlapper.simulation.layout import Layout, Pose
 from overlapper.simulation.model import LinkKey, ModelledBody, Skipped
 from overlapper.simulation.mujoco.contact import GeomContact
 from overlapper.simulation.mujoco.geoms import collidable, drawn_from, modelled_bodies
-from overlapper.simulation.mujoco.pair_rule import PairRule, in_force
+from overlapper.simulation.mujoco.pair_rule import PairRule, contact_filter, in_force
 from overlapper.simulation.mujoco.stepping import MujocoStepping
 from overlapper.simulation.source import Source
 
@@ -42,7 +42,7 @@ class MujocoSource(Source):
         self._model, self._data, self._given_names = model, data, dict(given_names)
         self.bodies: dict[int, ModelledBody] = {}
         self._read: tuple[bytes, bytes] | None = None  # the numbers of the model from which the bodies were read
-        self._rule: tuple[bytes, Layout, PairRule] | None = None
+        self._rule: tuple[object, Layout, PairRule] | None = None
         self._flexes_told = self._filter_told = False
 
     @property
@@ -68,10 +68,10 @@ class MujocoSource(Source):
 
     def rules(self, layout: Layout) -> PairRule:
         assert self._read  # by `refresh`
-        now = self._read[1]
+        now = self._read[1], contact_filter()
         if not self._rule or self._rule[0] != now or self._rule[1] is not layout:
             geoms = np.array([geom for _, geom in layout.collider_rows], dtype=np.int64)
-            self._rule = now, layout, PairRule(self._model, geoms)
+            self._rule = now, layout, PairRule(self._model, self._data, geoms)
         return self._rule[2]
 
     @property
@@ -92,10 +92,10 @@ class MujocoSource(Source):
         return MujocoStepping(self._model, self._data)
 
     def cautions(self, layout: Layout) -> Iterator[Warning]:
-        """One warning if a contact filter decides which pairs collide, as Python cannot ask the filter."""
-        if not self._filter_told and mujoco.get_mjcb_contactfilter() is not None:
+        """One warning if a contact filter in C decides which pairs collide, as Python cannot ask the filter."""
+        if not self._filter_told and mujoco.get_mjcb_contactfilter() is not contact_filter():
             self._filter_told = True
             yield UserWarning(
-                "mujoco.set_mjcb_contactfilter set a contact filter, so the masks do not decide which pairs collide: "
+                "mujoco.set_mjcb_contactfilter set a function of C, so the masks do not decide which pairs collide: "
                 "give the pairs with overlaps(pairs=...)"
             )

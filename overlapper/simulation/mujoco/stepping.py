@@ -85,7 +85,7 @@ class MujocoStepping:
     def turn_off(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
         """Contacts are off for all pairs. ValueError if these are not all pairs that MuJoCo lets collide."""
         geoms = collidable(self.model)
-        rule = PairRule(self.model, geoms)
+        rule = PairRule(self.model, self.data, geoms)
         place = {geom: k for k, geom in enumerate(geoms.tolist())}
         asked = np.array([(place[a], place[b]) for (_, a), (_, b) in pairs], dtype=np.intp).reshape(-1, 2)
         if missing := rule.count(np.ones(len(geoms), dtype=np.int64)) - int(rule.allow(*asked.T).sum()):
