@@ -467,17 +467,24 @@ class Placed:
     ----------
     shape : shape or (n, 3) array_like
         A shape without a pose, or points in m, which stand for their convex hull.
-    position : (3,) array_like, default (0, 0, 0)
-        Position of the shape's origin, m.
+    position : (3,) or (4, 4) array_like, default (0, 0, 0)
+        Position of the shape's origin, m. Or a homogeneous matrix, as in trimesh: a rotation, and a position in m.
     orientation : (4,) array_like or scipy.spatial.transform.Rotation, default (0, 0, 0, 1)
         Quaternion x, y, z, w as in pybullet, of any length but 0. The exact rotation is M(q) / |q|² for the quaternion as
-        given. The attribute `orientation` is divided by the length, which rounds.
+        given. The attribute `orientation` is divided by the length, which rounds. A matrix takes no orientation.
+
+    Raises
+    ------
+    ValueError
+        If an argument has the wrong shape, a pose is not finite, or a matrix scales, shears or reflects by more than 1e-6.
 
     Examples
     --------
     >>> from overlapper import Placed, Sphere
     >>> Placed(Sphere(0.5), position=(0, 0, 1)).bounds.tolist()
     [[-0.5, -0.5, 0.5], [0.5, 0.5, 1.5]]
+    >>> Placed(Sphere(0.5), [[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]).position.tolist()
+    [0.0, 0.0, 2.0]
     """
 
     def __init__(self, shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
@@ -502,7 +509,7 @@ class Placed:
         Raises
         ------
         ValueError
-            If the matrix scales, shears or mirrors by more than 1e-6, or if its last row is not (0, 0, 0, 1).
+            If the matrix scales, shears or reflects by more than 1e-6, or if its last row is not (0, 0, 0, 1).
         """
 
     @property
@@ -1102,16 +1109,16 @@ class Batch:
 
     def __setstate__(self, state: tuple[object, ...]) -> None: ...
 
-    def overlaps(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
+    def overlaps(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
         """
         Overlaps of many pairs of placed shapes in one call, as arrays. Other Python threads run meanwhile.
 
         Parameters
         ----------
-        positions : (k, 3) array_like
-            Positions of the shapes, m.
-        orientations : (k, 4) array_like
-            Quaternions x, y, z, w of the shapes, of any length but 0.
+        positions : (k, 3) or (k, 4, 4) array_like
+            Positions of the shapes, m. Or homogeneous matrices, as in `Placed`.
+        orientations : (k, 4) array_like, optional
+            Quaternions x, y, z, w of the shapes, of any length but 0. Matrices take no orientations.
         pairs : (p, 2) array_like of int, optional
             Indices of the shapes of each pair. Default: all pairs that overlap or touch, sorted.
         tolerance : float, default 0.001
@@ -1131,12 +1138,13 @@ class Batch:
         Raises
         ------
         ValueError
-            If an argument has the wrong shape, a pose is not finite, or half-spaces have an unbounded common set.
+            If an argument has the wrong shape, a pose is not finite, a matrix scales, shears or reflects by more than 1e-6,
+            or half-spaces have an unbounded common set.
         KeyboardInterrupt
             After Ctrl-C. Its attribute `overlaps` has the rows that were finished.
         """
 
-    def candidate_pairs(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
+    def candidate_pairs(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.int32]:
         """
         Pairs of shapes whose bounding boxes in the world meet.
 
@@ -1144,10 +1152,10 @@ class Batch:
 
         Parameters
         ----------
-        positions : (k, 3) array_like
-            Positions of the shapes, m.
-        orientations : (k, 4) array_like
-            Quaternions x, y, z, w of the shapes, of any length but 0.
+        positions : (k, 3) or (k, 4, 4) array_like
+            Positions of the shapes, m. Or homogeneous matrices, as in `Placed`.
+        orientations : (k, 4) array_like, optional
+            Quaternions x, y, z, w of the shapes, of any length but 0. Matrices take no orientations.
 
         Returns
         -------
@@ -1155,7 +1163,7 @@ class Batch:
             Indices i < j of the two shapes, sorted.
         """
 
-def overlaps(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
+def overlaps(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
     """
     Overlaps of many pairs of placed shapes in one call, as arrays. Other Python threads run meanwhile.
 
@@ -1163,10 +1171,10 @@ def overlaps(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpa
     ----------
     shapes : sequence of shapes
         The k shapes, without poses.
-    positions : (k, 3) array_like
-        Positions of the shapes, m.
-    orientations : (k, 4) array_like
-        Quaternions x, y, z, w of the shapes, of any length but 0.
+    positions : (k, 3) or (k, 4, 4) array_like
+        Positions of the shapes, m. Or homogeneous matrices, as in `Placed`.
+    orientations : (k, 4) array_like, optional
+        Quaternions x, y, z, w of the shapes, of any length but 0. Matrices take no orientations.
     pairs : (p, 2) array_like of int, optional
         Indices of the shapes of each pair. Default: all pairs that overlap or touch, sorted.
     tolerance : float, default 0.001
@@ -1186,12 +1194,13 @@ def overlaps(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpa
     Raises
     ------
     ValueError
-        If an argument has the wrong shape, a pose is not finite, or half-spaces have an unbounded common set.
+        If an argument has the wrong shape, a pose is not finite, a matrix scales, shears or reflects by more than 1e-6,
+        or half-spaces have an unbounded common set.
     KeyboardInterrupt
         After Ctrl-C. Its attribute `overlaps` has the rows that were finished.
     """
 
-def candidate_pairs(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
+def candidate_pairs(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.int32]:
     """
     Pairs of shapes whose bounding boxes in the world meet.
 
@@ -1201,10 +1210,10 @@ def candidate_pairs(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | 
     ----------
     shapes : sequence of shapes
         The k shapes, without poses.
-    positions : (k, 3) array_like
-        Positions of the shapes, m.
-    orientations : (k, 4) array_like
-        Quaternions x, y, z, w of the shapes, of any length but 0.
+    positions : (k, 3) or (k, 4, 4) array_like
+        Positions of the shapes, m. Or homogeneous matrices, as in `Placed`.
+    orientations : (k, 4) array_like, optional
+        Quaternions x, y, z, w of the shapes, of any length but 0. Matrices take no orientations.
 
     Returns
     -------

@@ -124,6 +124,9 @@ inline Quaternion to_quaternion(nb::handle value) {
   return {array.data()[0], array.data()[1], array.data()[2], array.data()[3]};
 }
 
+/// The pose of a homogeneous matrix, given by rows.
+std::pair<Vec3, Quaternion> matrix_pose(std::span<const double, 16> matrix, const std::string& name);
+
 inline double to_double(nb::handle value, const std::string& name) {
   try {
     return nb::cast<double>(value.type().is(nb::handle((PyObject*)&PyFloat_Type))

@@ -15,13 +15,38 @@ std::vector<Shape> to_shapes(nb::handle given) {
   return shapes;
 }
 
-/// (k, columns) numbers, one row per shape. The copy keeps other threads from changing them.
-std::vector<double> to_poses(nb::handle given, const char* name, size_t k, size_t columns) {
-  const std::string expected = "an array of shape (k, " + std::to_string(columns) + "), one row per shape";
-  const Doubles array = to_doubles(given, name, expected);
+/// Positions and quaternions, one row per shape. The copies keep other threads from changing them.
+struct PoseRows {
+  std::vector<double> positions, orientations;
+};
+
+std::vector<double> to_pose_rows(const Doubles& array, const char* name, size_t k, size_t columns) {
   if (array.ndim() != 2 || array.shape(0) != k || array.shape(1) != columns)
-    fail(name, "must be " + expected + ", not of shape " + shape_text(array));
+    fail(name, "must be an array of shape (k, " + std::to_string(columns) + "), one row per shape, not of shape " +
+                   shape_text(array));
   return {array.data(), array.data() + k * columns};
+}
+
+PoseRows to_poses(nb::handle positions, nb::handle orientations, size_t k) {
+  const Doubles given = to_doubles(positions, "positions", "an array of shape (k, 3) or (k, 4, 4), one row per shape");
+  const bool matrices = given.ndim() == 3;
+  if (matrices != orientations.is_none())
+    fail("orientations", matrices ? "must be left out if the positions are matrices"
+                                  : "must be given, unless the positions are matrices of shape (k, 4, 4)");
+  if (!matrices)
+    return {to_pose_rows(given, "positions", k, 3),
+            to_pose_rows(to_doubles(orientations, "orientations", "an array of shape (k, 4), one row per shape"),
+                         "orientations", k, 4)};
+  if (given.shape(0) != k || given.shape(1) != 4 || given.shape(2) != 4)
+    fail("positions", "must be an array of shape (k, 4, 4), one matrix per shape, not of shape " + shape_text(given));
+  PoseRows rows;
+  for (size_t i = 0; i < k; ++i) {
+    const std::span<const double, 16> matrix(given.data() + 16 * i, 16);
+    const auto [p, q] = matrix_pose(matrix, "positions[" + std::to_string(i) + "]");
+    rows.positions.insert(rows.positions.end(), {p.x, p.y, p.z});
+    rows.orientations.insert(rows.orientations.end(), {q.x, q.y, q.z, q.w});
+  }
+  return rows;
 }
 
 std::vector<IndexPair> to_pairs(nb::handle given, size_t k) {
@@ -48,8 +73,7 @@ nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orienta
                           nb::handle tolerance_given, nb::handle threads_given, nb::handle method_name,
                           bool separated) {
   const size_t k = batch.shapes().size();
-  const std::vector<double> p = to_poses(positions, "positions", k, 3);
-  const std::vector<double> q = to_poses(orientations, "orientations", k, 4);
+  const auto [p, q] = to_poses(positions, orientations, k);
   const double tolerance = to_double(tolerance_given, "tolerance");
   const int threads = to_threads(threads_given);
   const Method method = to_method(method_name);
@@ -71,8 +95,7 @@ nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orienta
 
 nb::object candidates(Batch& batch, nb::handle positions, nb::handle orientations) {
   const size_t k = batch.shapes().size();
-  const std::vector<double> p = to_poses(positions, "positions", k, 3);
-  const std::vector<double> q = to_poses(orientations, "orientations", k, 4);
+  const auto [p, q] = to_poses(positions, orientations, k);
   std::vector<IndexPair> pairs;
   {
     const nb::gil_scoped_release release;
@@ -273,16 +296,16 @@ shape, or to find the plane nearest to a point.)");
   cls.def("__setstate__", &set_state, nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
-#define OVERLAPPER_POSES "positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike"
+#define OVERLAPPER_POSES "positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None"
 
 /// The type of a sequence of shapes in signatures.
 std::string any_shapes() { return "collections.abc.Sequence[" + any_shape() + "]"; }
 
 constexpr const char* kPosesDoc =
-    R"(positions : (k, 3) array_like
-    Positions of the shapes, m.
-orientations : (k, 4) array_like
-    Quaternions x, y, z, w of the shapes, of any length but 0.
+    R"(positions : (k, 3) or (k, 4, 4) array_like
+    Positions of the shapes, m. Or homogeneous matrices, as in `Placed`.
+orientations : (k, 4) array_like, optional
+    Quaternions x, y, z, w of the shapes, of any length but 0. Matrices take no orientations.
 )";
 
 constexpr const char* kRestOfOverlapsDoc =
@@ -305,7 +328,8 @@ Overlaps
 Raises
 ------
 ValueError
-    If an argument has the wrong shape, a pose is not finite, or half-spaces have an unbounded common set.
+    If an argument has the wrong shape, a pose is not finite, a matrix scales, shears or reflects by more than 1e-6,
+    or half-spaces have an unbounded common set.
 KeyboardInterrupt
     After Ctrl-C. Its attribute `overlaps` has the rows that were finished.)";
 
@@ -364,13 +388,14 @@ Examples
         new (&self) Batch(to_shapes(state[0]));
       },
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
-  cls.def("overlaps", &batch_overlaps, "positions"_a.none(), "orientations"_a.none(), "pairs"_a.none() = nb::none(),
-          "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1, "method"_a.none() = "auto", "separated"_a = true,
+  cls.def("overlaps", &batch_overlaps, "positions"_a.none(), "orientations"_a.none() = nb::none(),
+          "pairs"_a.none() = nb::none(), "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1,
+          "method"_a.none() = "auto", "separated"_a = true,
           nb::sig("def overlaps(self, " OVERLAPPER_POSES ", pairs: numpy.typing.ArrayLike | None = None, "
                   "tolerance: float = 0.001, threads: int | None = 1, "
                   "method: typing.Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps"),
           overlaps_doc("").c_str());
-  cls.def("candidate_pairs", &candidates, "positions"_a.none(), "orientations"_a.none(),
+  cls.def("candidate_pairs", &candidates, "positions"_a.none(), "orientations"_a.none() = nb::none(),
           nb::sig("def candidate_pairs(self, " OVERLAPPER_POSES ") -> numpy.typing.NDArray[numpy.int32]"),
           candidates_doc("").c_str());
 }
@@ -387,7 +412,7 @@ void define_batch(nb::module_& m) {
         Batch batch(to_shapes(shapes));
         return batch_overlaps(batch, positions, orientations, pairs, tolerance, threads, method, separated);
       },
-      "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none(), "pairs"_a.none() = nb::none(),
+      "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none() = nb::none(), "pairs"_a.none() = nb::none(),
       "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1, "method"_a.none() = "auto", "separated"_a = true,
       nb::sig(("def overlaps(shapes: " + any_shapes() +
                ", " OVERLAPPER_POSES
@@ -401,7 +426,7 @@ void define_batch(nb::module_& m) {
         Batch batch(to_shapes(shapes));
         return candidates(batch, positions, orientations);
       },
-      "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none(),
+      "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none() = nb::none(),
       nb::sig(("def candidate_pairs(shapes: " + any_shapes() +
                ", " OVERLAPPER_POSES ") -> numpy.typing.NDArray[numpy.int32]")
                   .c_str()),

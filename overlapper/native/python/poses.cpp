@@ -48,6 +48,32 @@ nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handl
 
 }  // namespace
 
+std::pair<Vec3, Quaternion> matrix_pose(std::span<const double, 16> matrix, const std::string& name) {
+  constexpr double kMostOff = 1e-6;
+  if (!std::all_of(matrix.begin(), matrix.end(), [](double each) { return std::isfinite(each); }))
+    fail(name, "must be finite");
+  const auto column = [&](int k) { return Vec3{matrix[k], matrix[4 + k], matrix[8 + k]}; };
+  const Vec3 x = column(0), y = column(1), z = column(2);
+  if (!(matrix[12] == 0 && matrix[13] == 0 && matrix[14] == 0 && matrix[15] == 1))
+    fail(name, "must have the last row (0, 0, 0, 1)");
+  const double determinant = dot(cross(x, y), z);
+  if (determinant < 0) fail(name, "must not reflect: the determinant of its rotation is " + number(determinant));
+  const double stretch = std::max({std::abs(norm(x) - 1), std::abs(norm(y) - 1), std::abs(norm(z) - 1)});
+  if (stretch > kMostOff) fail(name, "must not scale: the length of an axis differs from 1 by " + number(stretch));
+  const double cosine = std::max({std::abs(dot(x, y)), std::abs(dot(y, z)), std::abs(dot(z, x))});
+  if (cosine > kMostOff)
+    fail(name, "must have right angles between its axes: the cosine of an angle is " + number(cosine));
+  // Of the four multiples of the quaternion, the one with the largest component loses no digits.
+  const double trace = x.x + y.y + z.z;
+  const double largest = std::max({trace, x.x, y.y, z.z});
+  Quaternion q;
+  if (largest == trace) q = {y.z - z.y, z.x - x.z, x.y - y.x, 1 + trace};
+  else if (largest == x.x) q = {1 + x.x - y.y - z.z, x.y + y.x, z.x + x.z, y.z - z.y};
+  else if (largest == y.y) q = {x.y + y.x, 1 - x.x + y.y - z.z, y.z + z.y, z.x - x.z};
+  else q = {z.x + x.z, y.z + z.y, 1 - x.x - y.y + z.z, x.y - y.x};
+  return {column(3), unit(q)};
+}
+
 void define_poses(nb::module_& m) {
   m.def("world_poses", &world_poses, "frames"_a, "which"_a, "positions"_a, "orientations"_a,
         nb::sig("def world_poses(frames: collections.abc.Sequence[typing.Any], which: "

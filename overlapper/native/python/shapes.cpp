@@ -317,27 +317,22 @@ void define(nb::module_& m, const RoundedHull*) {
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
-/// The pose of a homogeneous matrix. The quaternion is made of its largest component, which loses no digits.
-std::pair<Vec3, Quaternion> to_pose(nb::handle value) {
-  constexpr double kMostSkew = 1e-6;
-  const Doubles array = to_doubles(value, "matrix", "an array of numbers of shape (4, 4)");
+std::pair<Vec3, Quaternion> to_pose(nb::handle matrix) {
+  const Doubles array = to_doubles(matrix, "matrix", "an array of numbers of shape (4, 4)");
   if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4)
     fail("matrix", "must be an array of numbers of shape (4, 4), not of shape " + shape_text(array));
-  const auto at = [&](int row, int column) { return array.data()[4 * row + column]; };
-  const Vec3 x{at(0, 0), at(1, 0), at(2, 0)}, y{at(0, 1), at(1, 1), at(2, 1)}, z{at(0, 2), at(1, 2), at(2, 2)};
-  const bool turns = norm(cross(x, y) - z) <= kMostSkew && norm(cross(y, z) - x) <= kMostSkew &&
-                     norm(cross(z, x) - y) <= kMostSkew && std::abs(norm(x) - 1) <= kMostSkew;
-  if (!turns) fail("matrix", "must have a rotation in its first three rows and columns");
-  if (!(at(3, 0) == 0 && at(3, 1) == 0 && at(3, 2) == 0 && at(3, 3) == 1))
-    fail("matrix", "must have the last row (0, 0, 0, 1)");
-  const double trace = x.x + y.y + z.z;
-  const double largest = std::max({trace, x.x, y.y, z.z});
-  Quaternion q;
-  if (largest == trace) q = {y.z - z.y, z.x - x.z, x.y - y.x, 1 + trace};
-  else if (largest == x.x) q = {1 + x.x - y.y - z.z, x.y + y.x, z.x + x.z, y.z - z.y};
-  else if (largest == y.y) q = {x.y + y.x, 1 - x.x + y.y - z.z, y.z + z.y, z.x - x.z};
-  else q = {z.x + x.z, y.z + z.y, 1 - x.x - y.y + z.z, x.y - y.x};
-  return {{at(0, 3), at(1, 3), at(2, 3)}, unit(q)};
+  return matrix_pose(std::span<const double, 16>(array.data(), 16), "matrix");
+}
+
+/// The pose of a position and an orientation, or of a matrix in the place of the position.
+std::pair<Vec3, Quaternion> to_pose(nb::handle position, nb::handle orientation) {
+  const Quaternion q = to_quaternion(orientation);
+  const Doubles p = to_doubles(position, "position", "three numbers or a matrix of shape (4, 4)");
+  if (p.ndim() == 1 && p.shape(0) == 3) return {{p.data()[0], p.data()[1], p.data()[2]}, q};
+  if (p.ndim() != 2 || p.shape(0) != 4 || p.shape(1) != 4)
+    fail("position", "must be three numbers or a matrix of shape (4, 4), not an array of shape " + shape_text(p));
+  if (!unturned(q) || q.w != 1) fail("orientation", "must be left out if the position is a matrix");
+  return matrix_pose(std::span<const double, 16>(p.data(), 16), "position");
 }
 
 void define_placed(nb::module_& m) {
@@ -348,22 +343,29 @@ Parameters
 ----------
 shape : shape or (n, 3) array_like
     A shape without a pose, or points in m, which stand for their convex hull.
-position : (3,) array_like, default (0, 0, 0)
-    Position of the shape's origin, m.
+position : (3,) or (4, 4) array_like, default (0, 0, 0)
+    Position of the shape's origin, m. Or a homogeneous matrix, as in trimesh: a rotation, and a position in m.
 orientation : (4,) array_like or scipy.spatial.transform.Rotation, default (0, 0, 0, 1)
     Quaternion x, y, z, w as in pybullet, of any length but 0. The exact rotation is M(q) / |q|² for the quaternion as
-    given. The attribute `orientation` is divided by the length, which rounds.
+    given. The attribute `orientation` is divided by the length, which rounds. A matrix takes no orientation.
+
+Raises
+------
+ValueError
+    If an argument has the wrong shape, a pose is not finite, or a matrix scales, shears or reflects by more than 1e-6.
 
 Examples
 --------
 >>> from overlapper import Placed, Sphere
 >>> Placed(Sphere(0.5), position=(0, 0, 1)).bounds.tolist()
-[[-0.5, -0.5, 0.5], [0.5, 0.5, 1.5]])");
+[[-0.5, -0.5, 0.5], [0.5, 0.5, 1.5]]
+>>> Placed(Sphere(0.5), [[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]).position.tolist()
+[0.0, 0.0, 2.0])");
   placed.def(
       "__init__",
       [](Placed* self, nb::handle shape, nb::handle position, nb::handle orientation) {
-        new (self)
-            Placed(make_placed(to_shape(shape, "shape"), to_vec3(position, "position"), to_quaternion(orientation)));
+        const auto [p, q] = to_pose(position, orientation);
+        new (self) Placed(make_placed(to_shape(shape, "shape"), p, q));
       },
       "shape"_a.none(), "position"_a.none() = nb::make_tuple(0.0, 0.0, 0.0),
       "orientation"_a.none() = nb::make_tuple(0.0, 0.0, 0.0, 1.0),
@@ -398,7 +400,7 @@ Placed
 Raises
 ------
 ValueError
-    If the matrix scales, shears or mirrors by more than 1e-6, or if its last row is not (0, 0, 0, 1).)");
+    If the matrix scales, shears or reflects by more than 1e-6, or if its last row is not (0, 0, 0, 1).)");
   placed.def_prop_ro(
       "shape", [](const Placed& p) { return to_python(p.shape); },
       nb::sig(("def shape(self) -> " + any_shape()).c_str()));

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from scipy.spatial.transform import Rotation
 from strategies import hull_points, quaternion, turn
 
 from overlapper import Batch, Box, Capsule, Cylinder, HalfSpace, Hull, Overlaps, Placed, Sphere, overlap, overlaps
@@ -85,6 +86,18 @@ def test_a_row_is_the_overlap_of_its_pair(seed):
     assert len(answer) == answer.examined == len(pairs)
     for row, (i, j) in enumerate(pairs):
         assert_row_is_that_of(answer, row, overlap(placed[i], placed[j], tolerance=TOLERANCE))
+
+
+def test_homogeneous_matrices_are_poses():
+    shapes, positions, orientations = scene(np.random.default_rng(0))
+    matrices = np.tile(np.eye(4), (len(shapes), 1, 1))
+    matrices[:, :3, :3], matrices[:, :3, 3] = Rotation.from_quat(orientations).as_matrix(), positions
+    placed = [Placed(*each) for each in zip(shapes, matrices)]
+    where = [each.position for each in placed], [each.given_orientation for each in placed]
+    batch = Batch(shapes)
+    expected = bits(overlaps(shapes, *where))
+    assert bits(overlaps(shapes, matrices)) == bits(batch.overlaps(matrices.tolist())) == expected
+    assert_array_equal(batch.candidate_pairs(matrices), batch.candidate_pairs(*where))
 
 
 def test_a_row_hands_out_its_overlap():
@@ -347,6 +360,20 @@ POSES = ([[0, 0, 0], [1, 0, 0]], [[0, 0, 0, 1]] * 2)
         (
             {"orientations": [0, 0, 0, 1]},
             "orientations must be an array of shape (k, 4), one row per shape, not of shape (4,)",
+        ),
+        ({"positions": "there"}, "positions must be an array of shape (k, 3) or (k, 4, 4), one row per shape"),
+        (
+            {"positions": [np.eye(4)], "orientations": None},
+            "positions must be an array of shape (k, 4, 4), one matrix per shape, not of shape (1, 4, 4)",
+        ),
+        (
+            {"positions": [np.eye(4), np.diag([1, 1, -1, 1])], "orientations": None},
+            "positions[1] must not reflect: the determinant of its rotation is -1",
+        ),
+        ({"positions": [np.eye(4)] * 2}, "orientations must be left out if the positions are matrices"),
+        (
+            {"orientations": None},
+            "orientations must be given, unless the positions are matrices of shape (k, 4, 4)",
         ),
         ({"orientations": np.zeros((2, 4))}, "pose 0: orientation must not be the zero quaternion"),
         ({"positions": [[0, 0, 0], [0, np.inf, 0]]}, "pose 1: position must be finite"),

@@ -127,7 +127,7 @@ def test_every_argument_of_a_wrong_kind_is_refused_in_one_sentence_with_its_name
 
 def test_a_method_of_another_object_is_refused_by_the_types_of_its_arguments():
     with pytest.raises(
-        TypeError, match=r"^Batch.candidate_pairs\(positions, orientations\) takes no \(int, list, list\)$"
+        TypeError, match=r"^Batch.candidate_pairs\(positions, orientations=None\) takes no \(int, list, list\)$"
     ):
         overlapper.Batch.candidate_pairs(3, [], [])
 

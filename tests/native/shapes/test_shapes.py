@@ -285,25 +285,66 @@ def test_a_matrix_and_a_rotation_of_scipy_place_as_their_quaternion(q):
     assert_array_equal(Placed(CUBE, (1, 2, 3), turned).given_orientation, turned.as_quat())
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = turned.as_matrix(), (1, 2, 3)
-    found, unit = Placed.from_matrix(CUBE, matrix), turned.as_quat()
-    assert_array_equal(found.position, (1, 2, 3))
-    assert_allclose(found.orientation * np.sign(found.orientation @ unit), unit, rtol=0, atol=8 * EPS)
+    unit = turned.as_quat()
+    for found in (Placed(CUBE, matrix), Placed.from_matrix(CUBE, matrix.tolist())):
+        assert_array_equal(found.position, (1, 2, 3))
+        assert_allclose(found.orientation * np.sign(found.orientation @ unit), unit, rtol=0, atol=8 * EPS)
+
+
+def test_a_matrix_of_quarter_turns_is_an_exact_rotation():
+    matrix = [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]
+    assert_array_equal(
+        Placed(Hull([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 4]]), matrix).bounds, [[-2, -4, 0], [0, 0, 1]]
+    )
+
+
+SKEWED = np.eye(4)
+SKEWED[:2, 1] = 0.6, 0.8
 
 
 @pytest.mark.parametrize(
-    ("matrix", "sentence"),
+    ("matrix", "reason"),
     [
-        (np.eye(3), r"matrix must be an array of numbers of shape (4, 4), not of shape (3, 3)"),
-        ("turn", "matrix must be an array of numbers of shape (4, 4)"),
-        (np.diag([1, 1, 1.1, 1]), "matrix must have a rotation in its first three rows and columns"),
-        (np.diag([1, 1, -1, 1]), "matrix must have a rotation in its first three rows and columns"),
-        (np.full((4, 4), np.nan), "matrix must have a rotation in its first three rows and columns"),
-        (np.diag([1, 1, 1, 2]), "matrix must have the last row (0, 0, 0, 1)"),
+        (np.diag([1, 1, 1 + 2**-10, 1]), "must not scale: the length of an axis differs from 1 by 0.000976562"),
+        (np.diag([2, 2, 2, 1]), "must not scale: the length of an axis differs from 1 by 1"),
+        (np.diag([1, 1, 0, 1]), "must not scale: the length of an axis differs from 1 by 1"),
+        (np.diag([1, 1, -1, 1]), "must not reflect: the determinant of its rotation is -1"),
+        (SKEWED, "must have right angles between its axes: the cosine of an angle is 0.6"),
+        (np.full((4, 4), np.nan), "must be finite"),
+        (np.diag([1, 1, 1, 2]), "must have the last row (0, 0, 0, 1)"),
+        (np.eye(4) + np.eye(4, k=-3), "must have the last row (0, 0, 0, 1)"),
     ],
 )
-def test_a_matrix_that_is_not_a_pose_is_refused(matrix, sentence):
+def test_a_matrix_that_is_not_a_pose_is_refused(matrix, reason):
+    for name, place in (("matrix", Placed.from_matrix), ("position", Placed)):
+        with pytest.raises(ValueError, match=f"^{re.escape(f'{name} {reason}')}$"):
+            place(CUBE, matrix)
+
+
+@pytest.mark.parametrize(
+    ("place", "arguments", "sentence"),
+    [
+        (Placed.from_matrix, [np.eye(3)], "matrix must be an array of numbers of shape (4, 4), not of shape (3, 3)"),
+        (Placed.from_matrix, ["turn"], "matrix must be an array of numbers of shape (4, 4)"),
+        (Placed, ["turn"], "position must be three numbers or a matrix of shape (4, 4)"),
+        (
+            Placed,
+            [np.eye(3)],
+            "position must be three numbers or a matrix of shape (4, 4), not an array of shape (3, 3)",
+        ),
+        (Placed, [np.eye(4), (0, 0, 1, 1)], "orientation must be left out if the position is a matrix"),
+    ],
+)
+def test_a_pose_of_another_shape_is_refused(place, arguments, sentence):
     with pytest.raises(ValueError, match=f"^{re.escape(sentence)}$"):
-        Placed.from_matrix(CUBE, matrix)
+        place(CUBE, *arguments)
+
+
+def test_a_matrix_in_single_precision_is_a_pose():
+    turned = Rotation.from_rotvec([1, 2, 3])
+    matrix = np.eye(4, dtype=np.float32)
+    matrix[:3, :3] = turned.as_matrix()
+    assert_allclose(rotation(Placed(CUBE, matrix).orientation), turned.as_matrix(), atol=1e-7)
 
 
 @given(placed(solids))
