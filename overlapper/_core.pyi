@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, overload
 import numpy
 import numpy.typing
 from numpy.typing import NDArray
+import trimesh
 
 
 class Sphere:
@@ -465,8 +466,8 @@ class Placed:
 
     Parameters
     ----------
-    shape : shape or (n, 3) array_like
-        A shape without a pose, or points in m, which stand for their convex hull.
+    shape : shape, (n, 3) array_like or trimesh.Trimesh
+        A shape without a pose, or points in m, which stand for their convex hull. Or a closed convex mesh in m.
     position : (3,) or (4, 4) array_like, default (0, 0, 0)
         Position of the shape's origin, m. Or a homogeneous matrix, as in trimesh: a rotation, and a position in m.
     orientation : (4,) array_like or scipy.spatial.transform.Rotation, default (0, 0, 0, 1)
@@ -477,6 +478,7 @@ class Placed:
     ------
     ValueError
         If an argument has the wrong shape, a pose is not finite, or a matrix scales, shears or reflects by more than 1e-6.
+        If a mesh is not closed or not convex.
 
     Examples
     --------
@@ -487,17 +489,17 @@ class Placed:
     [0.0, 0.0, 2.0]
     """
 
-    def __init__(self, shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
+    def __init__(self, shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
 
     @staticmethod
-    def from_matrix(shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike, matrix: numpy.typing.ArrayLike) -> Placed:
+    def from_matrix(shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh, matrix: numpy.typing.ArrayLike) -> Placed:
         """
         A shape placed by a homogeneous matrix, as used by trimesh.
 
         Parameters
         ----------
-        shape : shape or (n, 3) array_like
-            A shape without a pose, or points in m, which stand for their convex hull.
+        shape : shape, (n, 3) array_like or trimesh.Trimesh
+            A shape without a pose, or points in m, which stand for their convex hull. Or a closed convex mesh in m.
         matrix : (4, 4) array_like
             A rotation, and a position in m.
 
@@ -847,7 +849,7 @@ class Overlap:
 def overlap(a: Placed, b: Placed, /) -> Overlap: ...
 
 @overload
-def overlap(*shapes: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001, method: Literal['auto', 'paper'] = 'auto') -> Overlap:
+def overlap(*shapes: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, tolerance: float = 0.001, method: Literal['auto', 'paper'] = 'auto') -> Overlap:
     """
     The common set of two or more convex shapes.
 
@@ -858,8 +860,9 @@ def overlap(*shapes: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | Roun
 
     Parameters
     ----------
-    *shapes : shape, Placed or (n, 3) array_like
-        Two or more bodies. A bare shape lies at the origin. Points in m stand for their convex hull.
+    *shapes : shape, Placed, (n, 3) array_like or trimesh.Trimesh
+        Two or more bodies. A bare shape lies at the origin. Points in m stand for their convex hull. A mesh in m must be
+        closed and convex.
     tolerance : float, default 0.001
         Allowed relative error of the volume for curved shapes, between 0 and 1. Polyhedra are exact and ignore it.
     method : {'auto', 'paper'}, default 'auto'
@@ -874,17 +877,17 @@ def overlap(*shapes: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | Roun
     Raises
     ------
     ValueError
-        If there are fewer than two shapes, or if the common set is unbounded.
+        If there are fewer than two shapes, if the common set is unbounded, or if a mesh is not closed or not convex.
     """
 
-def distance(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike) -> float:
+def distance(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed) -> float:
     """
     Distance between the nearest points of two shapes.
 
     Parameters
     ----------
-    a, b : shape, Placed or (n, 3) array_like
-        The two bodies.
+    a, b : shape, Placed, (n, 3) array_like or trimesh.Trimesh
+        The two bodies, as `overlap` takes them.
 
     Returns
     -------
@@ -898,14 +901,14 @@ def distance(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHu
     0.25
     """
 
-def penetration_depth(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike) -> float:
+def penetration_depth(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed) -> float:
     """
     Length of the shortest translation that separates two shapes.
 
     Parameters
     ----------
-    a, b : shape, Placed or (n, 3) array_like
-        The two bodies.
+    a, b : shape, Placed, (n, 3) array_like or trimesh.Trimesh
+        The two bodies, as `overlap` takes them.
 
     Returns
     -------
@@ -924,14 +927,14 @@ def penetration_depth(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | 
     0.25
     """
 
-def iou(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001) -> float:
+def iou(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, tolerance: float = 0.001) -> float:
     """
     Intersection over union of two shapes: the common volume divided by the volume of the union.
 
     Parameters
     ----------
-    a, b : shape, Placed or (n, 3) array_like
-        The two bodies.
+    a, b : shape, Placed, (n, 3) array_like or trimesh.Trimesh
+        The two bodies, as `overlap` takes them.
     tolerance : float, default 0.001
         Allowed relative error of the common volume for curved shapes, between 0 and 1.
 

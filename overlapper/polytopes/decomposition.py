@@ -22,6 +22,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -149,6 +150,24 @@ def decompose(
     return Decomposition(tuple(hulls), volume, path)
 
 
+def hull_of_mesh(mesh: Any, name: str) -> Hull:
+    """The hull of a convex mesh of trimesh. ValueError that names the argument for any other mesh."""
+    try:
+        surface = WeldedMesh.of(mesh.triangles)
+    except NotDecomposed as reason:
+        raise ValueError(f"{name} must be a closed convex mesh: {reason}") from None
+    if surface.open_edges:
+        edges = f"its surface has {surface.open_edges:,} open edges"
+        raise ValueError(f"{name} must be a closed mesh: {edges}; Hull(mesh.vertices) is its convex hull")
+    if surface.volume is None:
+        raise ValueError(f"{name} must be a mesh with all triangles facing outwards: mesh.fix_normals() turns them")
+    hulls = surface.convex_bodies() or []
+    if len(hulls) != 1:
+        call = f"{__name__}.decompose(mesh.triangles).parts"
+        raise ValueError(f"{name} must be a convex mesh: {call} are convex parts for overlapper.union.union_overlap")
+    return hulls[0]
+
+
 def _welded(corners: Vertices) -> tuple[Vertices, Faces]:
     """Vertices and faces, each once. Triangles without three distinct corners are dropped."""
     vertices, index = np.unique(corners.reshape(-1, 3) + 0.0, axis=0, return_inverse=True)  # + 0.0 makes -0.0 equal 0.0
@@ -194,10 +213,12 @@ def _convex_bodies(vertices: Vertices, faces: Faces) -> list[Hull] | None:
             hull = Hull(corners)
         except ValueError:
             return None
+        rows, count = np.unique(np.vstack([corners, hull.vertices]), axis=0, return_counts=True)
+        inner = rows[count == 1]  # a vertex of the hull has no depth
         # Corners that moved by √3 roundings moved the mesh's surface inwards, or the hull's outwards, by this distance.
         layer = 2 * math.sqrt(3) * ROUNDING * float(np.abs(corners).max())
         missing = hull.volume - _volume(vertices, shell)
-        if not missing <= layer * _area(hull.corners, hull.triangles) or _deepest(hull, corners) > layer:
+        if not missing <= layer * _area(hull.corners, hull.triangles) or _deepest(hull, inner) > layer:
             return None
         hulls.append(hull)
     return hulls
@@ -226,7 +247,7 @@ def _deepest(hull: Hull, points: Vertices) -> float:
     """The depth (m) of the deepest of some points below the surface of a hull."""
     planes, deepest = hull.halfspaces, 0.0
     for some in np.array_split(points, len(points) * len(planes) // 10**7 + 1):  # 80 MB at a time
-        deepest = max(deepest, float(-(some @ planes[:, :3].T + planes[:, 3]).max(axis=1).min()))
+        deepest = max(deepest, float(-(some @ planes[:, :3].T + planes[:, 3]).max(axis=1).min(initial=0.0)))
     return deepest
 
 

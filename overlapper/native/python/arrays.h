@@ -183,6 +183,8 @@ Shape to_shape(nb::handle value, const std::string& name);
 nb::object to_python(const Shape& shape);
 /// The type of any shape in signatures.
 std::string any_shape();
+/// The type of the argument of to_shape() in signatures.
+std::string any_solid();
 /// The same, at the origin unless it is a Placed.
 Placed to_placed(nb::handle value, const std::string& name);
 /// "auto" or "paper".

@@ -32,7 +32,7 @@ Overlap make_overlap(std::vector<Placed> bodies, double tolerance, Method method
 }
 
 /// The type of the argument of to_placed() in signatures.
-std::string any_body() { return any_shape() + " | Placed | numpy.typing.ArrayLike"; }
+std::string any_body() { return any_solid() + " | Placed"; }
 
 /// True if the answer takes so few microseconds that releasing the interpreter lock would double them.
 bool quick(const Shape& shape) { return !smooth(shape) && facets(shape) <= 64; }
@@ -489,8 +489,9 @@ void define_functions(nb::module_& m) {
 
 Parameters
 ----------
-*shapes : shape, Placed or (n, 3) array_like
-    Two or more bodies. A bare shape lies at the origin. Points in m stand for their convex hull.
+*shapes : shape, Placed, (n, 3) array_like or trimesh.Trimesh
+    Two or more bodies. A bare shape lies at the origin. Points in m stand for their convex hull. A mesh in m must be
+    closed and convex.
 tolerance : float, default 0.001
     Allowed relative error of the volume for curved shapes, between 0 and 1. Polyhedra are exact and ignore it.
 method : {'auto', 'paper'}, default 'auto'
@@ -505,7 +506,7 @@ Overlap
 Raises
 ------
 ValueError
-    If there are fewer than two shapes, or if the common set is unbounded.)");
+    If there are fewer than two shapes, if the common set is unbounded, or if a mesh is not closed or not convex.)");
   m.def(
       "distance",
       [](nb::handle a, nb::handle b) {
@@ -524,8 +525,8 @@ ValueError
 
 Parameters
 ----------
-a, b : shape, Placed or (n, 3) array_like
-    The two bodies.
+a, b : shape, Placed, (n, 3) array_like or trimesh.Trimesh
+    The two bodies, as `overlap` takes them.
 
 Returns
 -------
@@ -553,8 +554,8 @@ Examples
 
 Parameters
 ----------
-a, b : shape, Placed or (n, 3) array_like
-    The two bodies.
+a, b : shape, Placed, (n, 3) array_like or trimesh.Trimesh
+    The two bodies, as `overlap` takes them.
 
 Returns
 -------
@@ -582,8 +583,8 @@ Examples
 
 Parameters
 ----------
-a, b : shape, Placed or (n, 3) array_like
-    The two bodies.
+a, b : shape, Placed, (n, 3) array_like or trimesh.Trimesh
+    The two bodies, as `overlap` takes them.
 tolerance : float, default 0.001
     Allowed relative error of the common volume for curved shapes, between 0 and 1.
 

@@ -20,6 +20,12 @@ bool try_shapes(nb::handle value, Shape& shape, std::variant<Types...>*) {
 
 bool is_shape(nb::handle value, Shape& shape) { return try_shapes(value, shape, static_cast<Shape*>(nullptr)); }
 
+/// Whether it is a mesh of trimesh, which is not imported: without it there is no such mesh.
+bool is_mesh(nb::handle value) {
+  const nb::object trimesh = nb::module_::import_("sys").attr("modules").attr("get")("trimesh");
+  return nb::isinstance(value, nb::getattr(trimesh, "Trimesh", nb::tuple()));
+}
+
 bool is_body(nb::handle value) {
   Shape shape;
   return nb::isinstance<Placed>(value) || is_shape(value, shape);
@@ -38,9 +44,13 @@ Shape to_shape(nb::handle value, const std::string& name) {
     throw nb::type_error((name + " must be a bare shape, it is already placed").c_str());
   const bool array_like = PySequence_Check(value.ptr()) || nb::hasattr(value, "__array__");
   if (!array_like || nb::isinstance<nb::str>(value) || nb::isinstance<nb::bytes>(value)) {
+    if (is_mesh(value))
+      return nb::cast<Hull>(
+          nb::module_::import_("overlapper.polytopes.decomposition").attr("hull_of_mesh")(value, name));
     const std::string type = nb::cast<std::string>(value.type().attr("__name__"));
     const std::string hint = nb::hasattr(value, "vertices") ? ": Hull(mesh.vertices) makes a shape of a mesh" : "";
-    throw nb::type_error((name + " must be a shape or an (n, 3) array of points, not " + type + hint).c_str());
+    throw nb::type_error(
+        (name + " must be a shape, an (n, 3) array of points or a trimesh.Trimesh, not " + type + hint).c_str());
   }
   if (nb::isinstance<nb::sequence>(value) && nb::len(value) > 0 && is_body(value[0]))
     throw nb::type_error((name + " must be one shape, not a list of shapes: overlap(*shapes) takes a list").c_str());
@@ -61,6 +71,8 @@ static std::string names(const std::variant<Kinds...>*) {
 }
 
 std::string any_shape() { return names(static_cast<const Shape*>(nullptr)); }
+
+std::string any_solid() { return any_shape() + " | numpy.typing.ArrayLike | trimesh.Trimesh"; }
 
 std::string number(double value) {
   std::ostringstream text;
@@ -341,8 +353,8 @@ void define_placed(nb::module_& m) {
 
 Parameters
 ----------
-shape : shape or (n, 3) array_like
-    A shape without a pose, or points in m, which stand for their convex hull.
+shape : shape, (n, 3) array_like or trimesh.Trimesh
+    A shape without a pose, or points in m, which stand for their convex hull. Or a closed convex mesh in m.
 position : (3,) or (4, 4) array_like, default (0, 0, 0)
     Position of the shape's origin, m. Or a homogeneous matrix, as in trimesh: a rotation, and a position in m.
 orientation : (4,) array_like or scipy.spatial.transform.Rotation, default (0, 0, 0, 1)
@@ -353,6 +365,7 @@ Raises
 ------
 ValueError
     If an argument has the wrong shape, a pose is not finite, or a matrix scales, shears or reflects by more than 1e-6.
+    If a mesh is not closed or not convex.
 
 Examples
 --------
@@ -369,8 +382,8 @@ Examples
       },
       "shape"_a.none(), "position"_a.none() = nb::make_tuple(0.0, 0.0, 0.0),
       "orientation"_a.none() = nb::make_tuple(0.0, 0.0, 0.0, 1.0),
-      nb::sig(("def __init__(self, shape: " + any_shape() +
-               " | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), "
+      nb::sig(("def __init__(self, shape: " + any_solid() +
+               ", position: numpy.typing.ArrayLike = (0, 0, 0), "
                "orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None")
                   .c_str()));
   placed.def_static(
@@ -380,15 +393,13 @@ Examples
         return make_placed(to_shape(shape, "shape"), position, orientation);
       },
       "shape"_a.none(), "matrix"_a.none(),
-      nb::sig(("def from_matrix(shape: " + any_shape() +
-               " | numpy.typing.ArrayLike, matrix: numpy.typing.ArrayLike) -> Placed")
-                  .c_str()),
+      nb::sig(("def from_matrix(shape: " + any_solid() + ", matrix: numpy.typing.ArrayLike) -> Placed").c_str()),
       R"(A shape placed by a homogeneous matrix, as used by trimesh.
 
 Parameters
 ----------
-shape : shape or (n, 3) array_like
-    A shape without a pose, or points in m, which stand for their convex hull.
+shape : shape, (n, 3) array_like or trimesh.Trimesh
+    A shape without a pose, or points in m, which stand for their convex hull. Or a closed convex mesh in m.
 matrix : (4, 4) array_like
     A rotation, and a position in m.
 

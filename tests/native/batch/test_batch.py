@@ -392,7 +392,9 @@ def test_a_bad_argument_is_named(change, sentence):
 
 
 def test_an_argument_that_is_not_a_shape_is_named():
-    with pytest.raises(TypeError, match=re.escape("shapes[1] must be a shape or an (n, 3) array of points, not str")):
+    with pytest.raises(
+        TypeError, match=re.escape("shapes[1] must be a shape, an (n, 3) array of points or a trimesh.Trimesh, not str")
+    ):
         overlaps([Sphere(1), "ball"], *POSES)
     with pytest.raises(TypeError, match=r"^shapes\[0\] must be one shape, not a list of shapes: overlap\(\*shapes\)"):
         overlap([Sphere(1), Placed(Sphere(1))])
