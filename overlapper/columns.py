@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from overlapper.install import hint
+from overlapper.plots import of_a_moment
 
 if TYPE_CHECKING:
     import pandas
@@ -111,6 +112,32 @@ class Tabular(ABC):
         """
         frame: polars.DataFrame = _library("polars").DataFrame(self.columns(), nan_to_null=True)
         return frame
+
+    def plot(self, most: int = 8) -> NDArray[Any]:
+        """Draw the depth, volume and force of the pairs as bars.
+
+        The chart is one of pyplot, as for `Log.plot`, which draws the pairs over time.
+
+        Parameters
+        ----------
+        most : int, default 8
+            The most pairs to draw: those with the largest volumes. The chart says if there are more.
+
+        Returns
+        -------
+        (2,) or (3,) ndarray of matplotlib.axes.Axes
+            The panels of depth and volume, and of force for `Forces`.
+
+        Raises
+        ------
+        TypeError
+            If `most` is not a whole number.
+        ValueError
+            If `most` is less than 1.
+        ImportError
+            Without matplotlib.
+        """
+        return of_a_moment(self.columns(), most)
 
     def _repr_html_(self) -> str:
         """The first rows, as notebooks show a table."""

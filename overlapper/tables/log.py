@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
+from array import array
 from numbers import Real
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
 
+from numpy.typing import NDArray
+
 from overlapper.columns import Tabular
+from overlapper.plots import NEEDED, over_time
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.contacts import Contacts
 from overlapper.tables.outputs import StepTable
-from overlapper.tables.table_file import origin
+from overlapper.tables.table import COLUMNS, FORCES
+from overlapper.tables.table_file import origin, read_table
 from overlapper.whole_number import whole
 
 if TYPE_CHECKING:
@@ -77,7 +82,9 @@ class Log:
         """The number of the last step added."""
         self.unfinished: Path | None = None
         """Where the rows are that an error has kept from their place, if there are any."""
-        self._bodies, self._time, self._forces = bodies, 0.0, forces
+        self._bodies, self._forces = bodies, forces
+        self._moments = array("q"), array("d")
+        self._written: Path | None = None
         heading = origin(bodies.engine) | bodies.settings | settings
         self._table: StepTable | None = StepTable(Path(path), heading, per, forces)
 
@@ -129,12 +136,52 @@ class Log:
             raise ValueError(f"contacts has shape {shape} of link {link} of body {body}, which is not among the bodies")
         self._table.add(step, time, self._bodies, contacts, forces=forces)
         self.steps = step
+        for each, value in zip(self._moments, (step, time)):
+            each.append(value)
+
+    def plot(self, most: int = 8) -> NDArray[Any]:
+        """Draw the depth, volume and force of the pairs over time, as far as the loop has come.
+
+        The chart is one of pyplot: a notebook shows it, `matplotlib.pyplot.show()` opens a window, and
+        `log.plot()[0].figure.savefig("run.png")` needs no display. A line is a row of the table: a pair of shapes, or
+        a pair of links with `per="link"`. A pair is drawn as 0 in a step without contact. The force is the length of
+        the force between the two. The rows are read from the table.
+
+        Parameters
+        ----------
+        most : int, default 8
+            The most pairs to draw: those with the largest volumes. The chart says if there are more.
+
+        Returns
+        -------
+        (2,) or (3,) ndarray of matplotlib.axes.Axes
+            The panels of depth and volume, and of force if the log has columns for forces.
+
+        Raises
+        ------
+        TypeError
+            If `most` is not a whole number.
+        ValueError
+            If the log has no steps yet, or `most` is less than 1.
+        OSError
+            If the table was moved or removed.
+        ImportError
+            Without matplotlib.
+        """
+        if not self.steps:
+            raise ValueError("this Log has no steps to draw: add() writes one")
+        path = self._table.growing if self._table else self._written
+        rows = read_table(path) if path else []
+        names = [name for name in (COLUMNS | FORCES if self._forces else COLUMNS) if name in NEEDED]
+        columns = {name: [row.get(name) for row in rows] for name in names}
+        return over_time(columns, *self._moments, most)
 
     def close(self) -> None:
         """Put the finished table in its place."""
         table, self._table = self._table, None
         if table:
             table.close()
+            self._written = table.path
 
     def __enter__(self) -> Log:
         return self
@@ -146,4 +193,5 @@ class Log:
         if error is None or (self.steps and not isinstance(error, Exception)):
             self.close()
         elif self._table:
-            self.unfinished, self._table = self._table.leave(), None
+            self._written = self.unfinished = self._table.leave()
+            self._table = None

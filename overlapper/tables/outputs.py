@@ -91,6 +91,11 @@ class StepTable:
         else:
             self._table.write(rows(step, time, bodies, contacts, opinions, forces))
 
+    @property
+    def growing(self) -> Path:
+        """The file that has the rows until the table is closed."""
+        return self._table.growing
+
     def close(self) -> None:
         """Put the finished table in its place."""
         self._table.close()

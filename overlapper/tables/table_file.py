@@ -70,8 +70,10 @@ class Table(Protocol):
 
     `write` adds the rows of a step. `remark` adds metadata that became known only during the run. Call one of `close`
     and `leave` at the end. `close` puts the table in its place. `leave` does not, and returns the path of the rows. If
-    there are no rows, `leave` returns None and leaves no file.
+    there are no rows, `leave` returns None and leaves no file. Until then, the rows are in the file `growing`.
     """
+
+    growing: Path
 
     def write(self, rows: Iterable[Row]) -> None: ...
     def remark(self, name: str, value: str) -> None: ...
@@ -115,13 +117,13 @@ class CsvTable:
         self, path: Path, metadata: Mapping[str, str] | None = None, columns: Iterable[str] = tuple(COLUMNS)
     ) -> None:
         self._columns, self._place = list(columns), path
-        self._path = claim(path, ".csv")
+        self.growing = claim(path, ".csv")
         self._empty = True
         try:
             # Written in one call a step, so that a kill has no half-filled buffer to lose.
-            self._file = self._path.open("r+b", buffering=0)
+            self._file = self.growing.open("r+b", buffering=0)
         except BaseException:
-            self._path.unlink()
+            self.growing.unlink()
             raise
         try:
             heading = _text(f"# {name}: {printable(value)}" for name, value in (metadata or {}).items())
@@ -165,7 +167,7 @@ class CsvTable:
     def close(self) -> None:
         try:
             self._finish()
-            settle(self._path, self._place)
+            settle(self.growing, self._place)
         except BaseException:
             self.leave()
             raise
@@ -173,8 +175,8 @@ class CsvTable:
     def leave(self) -> Path | None:
         self._file.close()
         if self._empty:
-            self._path.unlink(missing_ok=True)
-        return None if self._empty else self._path
+            self.growing.unlink(missing_ok=True)
+        return None if self._empty else self.growing
 
 
 def _text(lines: Iterable[str]) -> bytes:
@@ -349,7 +351,7 @@ class ParquetTable(CsvTable):
             self.leave()
             raise
         with suppress(OSError):  # all of it is in the table
-            self._path.unlink()
+            self.growing.unlink()
 
     def _convert(self, path: Path) -> None:
         """Write the rows of the CSV file as Parquet."""
@@ -360,7 +362,7 @@ class ParquetTable(CsvTable):
         cells = pyarrow.csv.ConvertOptions(
             column_types=dict(fields), null_values=[""], strings_can_be_null=True, quoted_strings_can_be_null=False
         )
-        with self._path.open("rb") as file, parquet.ParquetWriter(path, schema, write_page_checksum=True) as writer:
+        with self.growing.open("rb") as file, parquet.ParquetWriter(path, schema, write_page_checksum=True) as writer:
             file.seek(self._body)
             waiting: list[Any] = []
             for batch in pyarrow.csv.open_csv(file, convert_options=cells):
@@ -400,9 +402,9 @@ class SqliteTable:
         self._columns = list(columns)
         self._place, self._empty = path, True
         self._seal = Seal.of(self._columns)
-        self._path = claim(path)
+        self.growing = claim(path)
         # Whoever writes takes care that no two threads do so at once.
-        self._connection = sqlite3.connect(self._path, check_same_thread=False)
+        self._connection = sqlite3.connect(self.growing, check_same_thread=False)
         kinds = {int: "INTEGER", float: "REAL", str: "TEXT"}
         declared = ", ".join(f"{name} {kinds[kind]}" for name, kind in columns.items())
         try:
@@ -446,7 +448,7 @@ class SqliteTable:
             # A log that an earlier database has left would be taken for one of the new.
             for ending in ("-wal", "-shm", "-journal"):
                 self._place.with_name(self._place.name + ending).unlink(missing_ok=True)
-            settle(self._path, self._place)
+            settle(self.growing, self._place)
         except BaseException:
             self.leave()
             raise
@@ -456,8 +458,8 @@ class SqliteTable:
             self._connection.close()
         if self._empty:
             for ending in ("", "-wal", "-shm", "-journal"):
-                self._path.with_name(self._path.name + ending).unlink(missing_ok=True)
-        return None if self._empty else self._path
+                self.growing.with_name(self.growing.name + ending).unlink(missing_ok=True)
+        return None if self._empty else self.growing
 
 
 def _in_sqlite(value: Value) -> Value:

@@ -125,6 +125,11 @@ recording
 ---
 with overlapper.watch(client) as watch: pybullet.stepSimulation()
 print(watch.summary.largest()[0].names)
+---
+with overlapper.Log("run.csv", bodies) as log: log.add(contacts)
+axes = log.plot()
+---
+contacts.plot()
 """
 
 
@@ -135,6 +140,8 @@ def test_a_notebook_shows_them_all(tmp_path):
     table, picture, page = (cell.outputs[-1].data["text/html"] for cell in notebook.cells[:3])
     assert "<table>" in table and "data:image/svg+xml" in picture and page.startswith("<iframe srcdoc=")
     assert "box#0" in notebook.cells[3].outputs[-1].text
+    for cell in notebook.cells[4:]:
+        assert sum("image/png" in output.get("data", {}) for output in cell.outputs) == 1
 
 
 def test_a_recording_without_a_frame_is_a_line():
