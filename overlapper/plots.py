@@ -43,7 +43,7 @@ def over_time(columns: Mapping[str, Any], steps: Sequence[int], times: Sequence[
     for ax, (name, values) in zip(axes, measures.items()):
         lines = {key: np.zeros(len(steps)) for key in shown}
         for key, step, value in zip(keys, columns["step"], values):
-            if key in lines:
+            if key in lines and step in place:  # Ctrl-C may have come between the rows of a step and its time
                 lines[key][place[step]] = value
         unit, factor = _unit(name, lines.values())
         for k, (key, line) in enumerate(lines.items()):

@@ -180,6 +180,7 @@ class Log:
         """Put the finished table in its place."""
         table, self._table = self._table, None
         if table:
+            self._written = table.growing  # where the rows stay if the table cannot be put in its place
             table.close()
             self._written = table.path
 

@@ -160,6 +160,15 @@ def test_after_an_error_the_rows_that_are_left_are_drawn(bodies, tmp_path, endin
     assert lines(ended(3.0)) == {}  # no row was written, and the table of another run is not drawn
 
 
+def test_rows_that_cannot_be_put_in_their_place_are_drawn(bodies, tmp_path):
+    log = Log(tmp_path / "own.csv", bodies)
+    log.add(bodies.overlaps())
+    (tmp_path / "own.csv").mkdir()
+    with pytest.raises(OSError, match=r"own\.csv"):
+        log.close()
+    assert [*lines(log.plot()[0])] == PAIRS
+
+
 def test_a_table_that_was_removed_is_named(bodies, tmp_path):
     with Log(tmp_path / "own.csv", bodies) as log:
         log.add(bodies.overlaps())
