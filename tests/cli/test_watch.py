@@ -386,7 +386,7 @@ def test_a_simulation_in_real_time_is_sampled():
     elapsed = time.monotonic() - begin
     assert done.returncode == 0, done.stderr
     (simulation,) = json.loads(said(done).splitlines()[-1])["simulations"]
-    assert 2 <= simulation["sampled"] <= 100 * elapsed
+    assert 1 <= simulation["sampled"] <= 100 * elapsed
     assert simulation["measured"] == simulation["steps"] == simulation["sampled"] + 3
     time_of = {row["step"]: row["time_s"] for row in read_table(Path("own.csv"))}
     times = list(time_of.values())
