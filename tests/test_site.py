@@ -55,7 +55,7 @@ def test_signatures_say_shape_in_place_of_all_kinds_of_shapes():
     told = str(inspect.signature(overlapper.distance)).replace("'", "")
     assert "Hull | " in told
     assert short(None, None, None, None, None, told, "Hull | Box") == (
-        "(a: Shape | Placed | ArrayLike, b: Shape | Placed | ArrayLike) -> float",
+        "(a: Shape | ArrayLike | trimesh.Trimesh | Placed, b: Shape | ArrayLike | trimesh.Trimesh | Placed) -> float",
         "Hull | Box",
     )
 
