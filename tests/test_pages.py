@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGES = [str(page.relative_to(ROOT)) for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))]
 BLOCK = re.compile(r"^```([^`\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # .ci/run runs the commands that make the environment. test_live.py runs the commands that wait for Ctrl-C.
-ELSEWHERE = re.compile(r"(make|python3 -m venv|\. env/bin/activate|pip install)\b|.* --live\b")
+ELSEWHERE = re.compile(r"(make|python3 -m venv|\. env/bin/activate|pip install|conda install)\b|.* --live\b")
 # These exit with 1 if something overlaps, has moved or is skipped.
 ANSWERS_BY_EXIT_CODE = re.compile(r"overlapper (audit|clashes|check|diff|shapes)\b|pytest\b")
 
