@@ -198,6 +198,38 @@ def test_the_chart_has_axes_with_units_for_volume_and_depth_of_pairs_and_of_all(
     assert (left + 8, right - 8) == (chart_left + 60, chart_right - 12)
 
 
+def near(picture, color):
+    """How many pixels have nearly this color."""
+    return int((np.abs(picture.astype(int) - color).max(axis=2) < 40).sum())
+
+
+def test_the_largest_pairs_have_a_colour_each_in_the_chart_and_in_its_legend(browser, tmp_path):
+    """Here are ten pairs, of which eight have a colour. A click on the legend chooses a pair."""
+    depths = [0.01 * (10 - k) for k in range(10)]
+    balls = [{1 + k: Placed(Sphere(0.1), (0.3 * k, 0, 0.1 - depth * share)) for k, depth in enumerate(depths)}
+             for share in (0.5, 1)]  # fmt: skip
+    page = recorded([Scene({0: Placed(HalfSpace([0, 0, 1], 0))} | each) for each in balls], tmp_path / "ten.html")
+    opened(browser, page, "#t=0")
+    left, top, right, bottom = sides(browser, "#chart")
+    drawn = browser.picture()[top:bottom, left:right]
+    keys = "[...document.querySelectorAll('#caption .key')]"
+    said = browser.ask(f"{keys}.map(key => key.textContent)")
+    assert len(set(said)) == 9 and said[-1] == "others are grey" and all(" – " in pair for pair in said[:-1])
+    hues = browser.ask(f"{keys}.slice(0, 8).map(key => getComputedStyle(key.firstChild).backgroundColor)")
+    colors = [[int(part) for part in re.findall(r"\d+", hue)][:3] for hue in hues]
+    assert len(set(hues)) == 8 and all(near(drawn, color) > 50 for color in colors)
+    browser.ask(f"(window.third = {keys}[2]).onpointerenter()")
+    assert (browser.picture()[top:bottom, left:right] != drawn).any()
+    browser.ask("third.onpointerleave()")
+    assert browser.ask(f"{keys}.length") == 9
+    browser.ask("third.onclick()")
+    assert text(browser, "#caption") == said[2]
+    assert not browser.ask("document.querySelector('#numbers').hidden")
+    browser.press("Escape")
+    browser.press("t")
+    browser.wait("document.querySelector('#caption').textContent === ''")
+
+
 def test_a_chart_of_nothing_says_so(browser, tmp_path):
     page = recorded([hand_at(0.3), hand_at(0.4)], tmp_path / "apart.html")
     opened(browser, page, "#t=0")

@@ -13,8 +13,23 @@ const together = {
 };
 const background = document.createElement("canvas");
 
+// The pairs with the largest volumes have a colour each, apart from the colours of bodies. The others are grey.
+const HUES = ["#f0e442", "#3ddc97", "#b497ff", "#ff7f6b", "#5fe0e6", "#c9e265", "#e7a6d8", "#d9b38c"];
+const peaks = pairs.map(() => 0);
+film.sighting_pair.forEach((pair, s) => peaks[pair] = Math.max(peaks[pair], film.numbers[s]));
+const coloured = [...peaks.keys()].filter(pair => peaks[pair] > 0).sort((a, b) => peaks[b] - peaks[a]).slice(0, HUES.length);
+const legend = coloured.map((pair, k) => {
+  const mark = element("i"), key = element("span", {className: "key"}, mark, pairs[pair].join(" – "));
+  mark.style.background = HUES[k];
+  key.onpointerenter = () => hover(pair);
+  key.onpointerleave = () => hover(-1);
+  key.onclick = () => choose(pair);
+  return key;
+});
+if (pairs.length > coloured.length) legend.push(element("span", {className: "key", textContent: "others are grey"}));
+
 function traceAll() {
-  curves = kind.total ? [[]] : pairs.map(() => []);
+  curves = kind.total ? [[]] : pairs.map((_, pair) => Object.assign([], {pair}));
   for (let frame = 0; frame <= last; frame++) {
     let all = 0;
     for (const s of sightings(frame)) {
@@ -138,7 +153,13 @@ function sizeChart() {
   chart.ariaLabel = largest ? `${title}, over time: up to ${plain(largest / unit[1], 3)}` : "nothing is shared";
   chart.scaleText = levels.map(value => plain(value / unit[1], 3));
   context.strokeStyle = kind.total ? "#e8ebf0" : `#a7b0bd${drawnCurves.length > 100 ? "40" : drawnCurves.length > 20 ? "80" : "d0"}`;
-  for (const curve of drawnCurves.slice(0, CURVES)) trace(context, curve);
+  const few = drawnCurves.slice(0, CURVES), hueOf = curve => kind.total ? undefined : HUES[coloured.indexOf(curve.pair)];
+  for (const curve of few.filter(curve => !hueOf(curve))) trace(context, curve);
+  context.lineWidth = 1.5 * ratio;
+  for (const curve of few.filter(hueOf).reverse()) {
+    context.strokeStyle = hueOf(curve);
+    trace(context, curve);
+  }
   drawChart();
 }
 
@@ -157,7 +178,7 @@ function drawChart() {
     context.fillRect(across(shown) - ratio / 2, 0, ratio, chart.height - BOTTOM * ratio);
   }
   const pair = hovered >= 0 ? hovered : chosen;
-  byId("caption").replaceChildren(...(pair >= 0 ? named(pairs[pair]) : []));
+  byId("caption").replaceChildren(...(pair >= 0 && !byId("caption").matches(":hover") ? named(pairs[pair]) : kind.total ? [] : legend));
 }
 
 // The pair whose curve is nearest to a point of the chart.
