@@ -499,6 +499,19 @@ def test_step_simulation_within_the_block_is_a_step(world, recorded):
     p.disconnect(other)
 
 
+def test_pybullet_refuses_invalid_calls_of_step_simulation_within_the_block(world):
+    resting(world)
+    with world.contact() as contact:
+        for call in (lambda: p.stepSimulation(world.client, 1), lambda: p.stepSimulation(client=1)):
+            with pytest.raises(TypeError, match="argument"):
+                call()
+        assert contact.substeps == 0
+        p.disconnect(world.client)
+        with pytest.raises(p.error, match="Not connected"):
+            p.stepSimulation(world.client)
+    assert p.connect(p.DIRECT) == world.client  # for the end of `world`
+
+
 def test_a_warning_within_step_simulation_names_the_line_that_calls_it(world):
     resting(world)
     with world.contact(stiffness=1e12, substeps=1), pytest.warns(SubstepsWarning) as caught:

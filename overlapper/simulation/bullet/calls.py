@@ -138,7 +138,8 @@ class _Heard:
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         arguments = dict(zip(CALLS[self._name], args)) | kwargs
-        if self._name == "stepSimulation" and (step := _steps.get(arguments.get("physicsClientId", 0))):
+        step = _steps.get(arguments.get("physicsClientId", 0)) if self._name == "stepSimulation" else None
+        if step and pybullet.isConnected(*args, **kwargs):  # it refuses the arguments that stepSimulation refuses
             step()
             return ()  # as stepSimulation
         result = _ORIGINALS[self._name](*args, **kwargs)
