@@ -155,7 +155,6 @@ class Watch:
         self._files = ExitStack()
         self._take: Callable[[Frame[AnyBodies]], None] | None = None
         self._rhythm = 0, 0.0, 0.0  # steps and time at the last change of the time step, and the time step
-        self._lock = threading.RLock()
         self._sampler: threading.Thread | None = None
         self._enough = threading.Event()  # ends the sampler
         self._error: Exception | None = None  # of the sampler
@@ -167,8 +166,7 @@ class Watch:
         if which != self.physicsClientId or os.getpid() != self._process:
             return
         if happening == "stepped":
-            with self._lock:
-                self._stepped()
+            self._stepped()
         elif happening == "real time begins" and not self._sampler:
             self._enough.clear()
             self._sampler = threading.Thread(target=self._sample, daemon=True)
@@ -181,13 +179,17 @@ class Watch:
     def _sample(self) -> None:
         last = due = time.monotonic()
         while not self._enough.wait(max(0, due - time.monotonic())):
-            due = max(due + 1 / self.rate, time.monotonic())
             try:
-                with self._lock, self._simulation.held():
-                    self.steps, self.sampled = self.steps + 1, self.sampled + 1
+                with self._simulation.held() as held:
+                    if not held:
+                        continue
+                    due = max(due + 1 / self.rate, time.monotonic())
+                    self.steps += 1
                     self.time += time.monotonic() - last
+                    self._rhythm = 0, 0.0, 0.0  # later steps count from here
                     if self.steps % self.every == 0:
                         self._measure()
+                    self.sampled += 1  # the client may have been disconnected meanwhile
                 last = time.monotonic()
             except Exception as error:
                 if self._simulation.running:
@@ -199,7 +201,6 @@ class Watch:
             self._enough.set()
             self._sampler.join()
             self._sampler = None
-            self._rhythm = 0, 0.0, 0.0
 
     def _stepped(self) -> None:
         seconds = self._simulation.time_step

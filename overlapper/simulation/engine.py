@@ -51,8 +51,11 @@ class Simulation(Protocol):
     def step(self) -> None:
         """Make a time step."""
 
-    def held(self) -> AbstractContextManager[None]:
-        """Hold a simulation that runs in real time, during the block."""
+    def held(self) -> AbstractContextManager[bool]:
+        """Hold a simulation that runs in real time, during the block. It gives False if another thread is busy with it.
+
+        Then nothing is held.
+        """
 
     def leave(self) -> None:
         """Stop observing the simulation, which may go on."""

@@ -399,6 +399,26 @@ def test_a_simulation_in_real_time_is_sampled():
     )
 
 
+def test_calls_between_samples_in_real_time():
+    """Steps and samples count the time together. No body goes while it is sampled."""
+    calls = """
+p.setRealTimeSimulation(1, physicsClientId=c)
+for _ in range(100):
+    body = p.createMultiBody(1, ball, basePosition=[20, 0, 9], physicsClientId=c)
+    p.stepSimulation(c)
+    time.sleep(0.005)
+    p.removeBody(body, c)
+p.disconnect(c)
+"""
+    script(REAL_TIME + calls)
+    done = watch("--rate", "200", "--pairs", "all", "--json", "--out", "own.csv", "script.py")
+    assert done.returncode == 0, done.stderr
+    (simulation,) = json.loads(said(done).splitlines()[-1])["simulations"]
+    assert simulation["steps"] == simulation["sampled"] + 100
+    times = [row["time_s"] for row in read_table(Path("own.csv"))]
+    assert times == sorted(times)
+
+
 def test_a_failed_sample_of_a_simulation_in_real_time_is_reported():
     script("import tempfile; tempfile.tempdir = '/no/such/folder'" + REAL_TIME)
     done = watch("--rate", "100", "script.py")

@@ -186,6 +186,31 @@ def test_the_loop_of_the_documents_is_watched():
     assert {row["step"] % 4 for row in read_table(Path("r2d2.csv"))} == {0}
 
 
+def test_a_step_that_fails_in_real_time_ends_the_watch():
+    """A sample must not wait for the call that ends the watch."""
+    script = """
+import faulthandler, threading, time
+import pybullet as p
+import overlapper
+faulthandler.dump_traceback_later(60, exit=True)
+c = p.connect(p.SHARED_MEMORY_SERVER)
+watch = overlapper.watch(c, rate=1000)
+def fail(frame):
+    if threading.current_thread() is threading.main_thread():
+        time.sleep(0.2)  # until a sample is due
+        raise OSError("the disk is full")
+watch._take = fail
+p.setRealTimeSimulation(1, c)
+try:
+    p.stepSimulation(c)
+except OSError as error:
+    print(error, watch.open)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "the disk is full False\n" in done.stdout
+
+
 def test_a_step_of_volumetric_contact_is_one_step(client):
     p.createMultiBody(0, p.createCollisionShape(p.GEOM_PLANE, physicsClientId=client), physicsClientId=client)
     box = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import functools
+import os
+import threading
 import types
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 import pybullet
@@ -83,6 +86,20 @@ _ORIGINALS: dict[str, Callable[..., Any]] = {}
 _listeners: list[Listener] = []
 _steps: dict[int, Callable[[], None]] = {}  # what makes the steps of clients in place of stepSimulation
 
+busy = threading.RLock()
+"""Held during a call and its listeners. A thread that reads a client holds it, so that no body goes meanwhile."""
+
+_NOT_BUSY = {"setRealTimeSimulation", "disconnect"}  # a listener to these waits for threads, which may hold `busy`
+
+
+def _renew() -> None:
+    global busy
+    busy = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew)  # the thread that holds it does not exist in the child
+
 
 def listen(listener: Listener) -> None:
     """Add a listener to all CALLS of all clients. The functions of `pybullet` are replaced by wrappers meanwhile."""
@@ -120,8 +137,9 @@ def unheard(name: str) -> Callable[..., Any]:
 
 def tell(name: str, arguments: Arguments) -> None:
     """Report to the listeners one call that was made by one or more unheard calls."""
-    for listener in tuple(_listeners):
-        listener(name, arguments, None)
+    with busy:
+        for listener in tuple(_listeners):
+            listener(name, arguments, None)
 
 
 class _Heard:
@@ -137,12 +155,13 @@ class _Heard:
         return types.BuiltinFunctionType
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        arguments = dict(zip(CALLS[self._name], args)) | kwargs
-        step = _steps.get(arguments.get("physicsClientId", 0)) if self._name == "stepSimulation" else None
-        if step and pybullet.isConnected(*args, **kwargs):  # it refuses the arguments that stepSimulation refuses
-            step()
-            return ()  # as stepSimulation
-        result = _ORIGINALS[self._name](*args, **kwargs)
-        for listener in tuple(_listeners):
-            listener(self._name, arguments, result)
-        return result
+        with nullcontext() if self._name in _NOT_BUSY else busy:
+            arguments = dict(zip(CALLS[self._name], args)) | kwargs
+            step = _steps.get(arguments.get("physicsClientId", 0)) if self._name == "stepSimulation" else None
+            if step and pybullet.isConnected(*args, **kwargs):  # it refuses the arguments that stepSimulation refuses
+                step()
+                return ()  # as stepSimulation
+            result = _ORIGINALS[self._name](*args, **kwargs)
+            for listener in tuple(_listeners):
+                listener(self._name, arguments, result)
+            return result

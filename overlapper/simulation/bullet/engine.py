@@ -51,12 +51,18 @@ class Client:
             raise Unreadable("its client is disconnected") from error
 
     @contextmanager
-    def held(self) -> Iterator[None]:
-        _set_real_time(self._client, False)
+    def held(self) -> Iterator[bool]:
+        if not calls.busy.acquire(timeout=0.01):
+            yield False
+            return
         try:
-            yield
+            _set_real_time(self._client, False)
+            try:
+                yield True
+            finally:
+                _set_real_time(self._client, True)
         finally:
-            _set_real_time(self._client, True)
+            calls.busy.release()
 
     def leave(self) -> None:
         if self._own:

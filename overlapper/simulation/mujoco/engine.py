@@ -44,8 +44,8 @@ class Simulated:
     def step(self) -> None:
         mujoco.mj_step(self._known.model, self._known)
 
-    def held(self) -> AbstractContextManager[None]:
-        return nullcontext()  # only calls make steps
+    def held(self) -> AbstractContextManager[bool]:
+        return nullcontext(True)  # only calls make steps
 
     def leave(self) -> None:
         return

@@ -1,8 +1,10 @@
 """Clients and servers: several at once, remote, disconnected, and unable to write their files."""
 
 import os
+import signal
 import subprocess
 import sys
+import threading
 
 import pybullet as p
 import pytest
@@ -10,6 +12,30 @@ from simulated import body, box
 
 from overlapper import Box, Sphere
 from overlapper.simulation import Bodies, Recorder
+from overlapper.simulation.bullet import calls
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no fork")
+def test_a_forked_process_does_not_wait_for_a_thread_of_its_parent(client):
+    held, done = threading.Event(), threading.Event()
+
+    def hold():
+        with calls.busy:
+            held.set()
+            done.wait()
+
+    with Recorder(client):
+        thread = threading.Thread(target=hold)
+        thread.start()
+        held.wait()
+        child = os.fork()
+        if child == 0:
+            signal.alarm(20)  # ends it if it waits
+            p.stepSimulation(client)
+            os._exit(0)
+        done.set()
+        assert os.waitpid(child, 0)[1] == 0
+        thread.join()
 
 
 def test_two_clients_are_independent(client):
