@@ -87,6 +87,12 @@ def test_a_mesh_that_is_no_convex_solid_is_refused_in_one_sentence(mesh, reason)
             make()
 
 
+def test_a_point_cloud_is_refused_in_one_sentence():
+    words = "shape must be a shape, an (n, 3) array of points or a trimesh.Trimesh, not PointCloud: "
+    with pytest.raises(TypeError, match=f"^{re.escape(words)}"):
+        Placed(trimesh.PointCloud(np.eye(3)))  # it has items, but no length
+
+
 def test_triangles_that_faced_both_ways_are_a_shape_after_the_call_that_the_message_names():
     mesh = cube_and(lambda mesh: mesh.faces.__setitem__(0, mesh.faces[0, ::-1]))
     mesh.fix_normals()
