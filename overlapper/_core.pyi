@@ -1104,7 +1104,7 @@ class Batch:
     ([[0, 1]], [0.163625])
     """
 
-    def __init__(self, shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid]) -> None: ...
+    def __init__(self, shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh]) -> None: ...
 
     def __repr__(self) -> str: ...
 
@@ -1166,7 +1166,7 @@ class Batch:
             Indices i < j of the two shapes, sorted.
         """
 
-def overlaps(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
+def overlaps(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
     """
     Overlaps of many pairs of placed shapes in one call, as arrays. Other Python threads run meanwhile.
 
@@ -1203,7 +1203,7 @@ def overlaps(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpa
         After Ctrl-C. Its attribute `overlaps` has the rows that were finished.
     """
 
-def candidate_pairs(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.int32]:
+def candidate_pairs(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.int32]:
     """
     Pairs of shapes whose bounding boxes in the world meet.
 

@@ -299,7 +299,7 @@ shape, or to find the plane nearest to a point.)");
 #define OVERLAPPER_POSES "positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None"
 
 /// The type of a sequence of shapes in signatures.
-std::string any_shapes() { return "collections.abc.Sequence[" + any_shape() + "]"; }
+std::string any_shapes() { return "collections.abc.Sequence[" + any_solid() + "]"; }
 
 constexpr const char* kPosesDoc =
     R"(positions : (k, 3) or (k, 4, 4) array_like

@@ -30,7 +30,13 @@ def test_the_type_of_ways_has_all_their_names():
 
 
 def test_user_programs_type_check_against_the_stub(tmp_path):
-    program = "from overlapper import Sphere, overlap; reveal_type(overlap(Sphere(1.0), Sphere(2.0)).volume)"
+    program = """
+import numpy as np
+from overlapper import Batch, Sphere, overlap, overlaps
+overlaps([Sphere(1.0), np.eye(4, 3)], np.zeros((2, 4, 4)))
+Batch([Sphere(1.0), np.eye(4, 3)])
+reveal_type(overlap(Sphere(1.0), Sphere(2.0)).volume)
+"""
     mypy = [sys.executable, "-m", "mypy", "--cache-dir", tmp_path, "-c", program]
     checked = subprocess.run(mypy, cwd=tmp_path, capture_output=True, text=True)
-    assert 'Revealed type is "float"' in checked.stdout, checked.stdout
+    assert 'Revealed type is "float"' in checked.stdout and checked.returncode == 0, checked.stdout
