@@ -27,7 +27,7 @@ MOST_SUBSTEPS = 200
 class VolumetricContact:
     """Contact forces from the volumes that bodies share, in place of the contact points of pybullet or MuJoCo.
 
-        bodies = Bodies(physicsClientId)  # or Bodies(model, data)
+        bodies = Bodies(physicsClientId)  # or overlapper.mujoco.Bodies(model, data)
         contact = VolumetricContact(bodies)
         with contact:
             while ...:
