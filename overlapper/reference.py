@@ -8,6 +8,7 @@ C++ exception that no `except` in Python can catch.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -39,6 +40,7 @@ TOLERANCE = 1e-6
 
 By = Literal["fcl", "mujoco"]
 NAMES: dict[By, str] = {"fcl": "FCL", "mujoco": "MuJoCo"}
+OF_FIELD = "MuJoCo answers for a whole height field, not for the part of it in this pair."
 
 # The exact value is computed to this fraction of the difference of the two sides. This suffices to say which is nearer.
 RESOLUTION = 1e-3
@@ -113,7 +115,8 @@ class Mujoco:
     """Checks overlaps of a MuJoCo simulation with MuJoCo's own contacts and distances.
 
     A pair overlaps by MuJoCo if one of its contacts has a negative `dist`. If MuJoCo does not test the pair for
-    contacts, the sign of the distance decides. The distance, or minus the depth, is that of `mj_geomDistance`.
+    contacts, the sign of the distance decides. The distance, or minus the depth, is that of `mj_geomDistance`. A pair
+    with a part of a height field gets the verdict "unsupported": MuJoCo only answers for the whole height field.
     """
 
     by: By = "mujoco"
@@ -126,8 +129,12 @@ class Mujoco:
         if not hasattr(bodies, "own_distances"):
             raise ValueError("check='mujoco' needs a simulation of MuJoCo, but another simulator runs this one")
         overlapping, distances = bodies.own_distances(contacts)
-        theirs = map(Figures, overlapping.tolist(), distances.tolist())
-        return [_judged(contact.overlap, each, None, self.by) for contact, each in zip(contacts, theirs)]
+        return [
+            Comparison("unsupported", _ours(contact.overlap), None, OF_FIELD, by=self.by)
+            if math.isnan(distance)
+            else _judged(contact.overlap, Figures(told, distance), None, self.by)
+            for contact, told, distance in zip(contacts, overlapping.tolist(), distances.tolist())
+        ]
 
     def close(self) -> None:
         return

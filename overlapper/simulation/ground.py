@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from overlapper import Shape
-from overlapper.quaternion import composed, rotated
+from overlapper import Shape, _core
+from overlapper.quaternion import rotated
 from overlapper.simulation.collision_rules import Mask, Rules
 from overlapper.simulation.height_field import Numbers
-from overlapper.simulation.layout import Layout
-from overlapper.simulation.model import BASE, Array, Ground, ModelledBody
+from overlapper.simulation.layout import Layout, Pose
+from overlapper.simulation.model import Array, Ground, LinkKey, ModelledBody
+
+FIRST, BACK = np.zeros(1, dtype=np.int64), np.array([-1.0, -1.0, -1.0, 1.0])
 
 
 class GroundBelow:
@@ -27,15 +29,14 @@ class GroundBelow:
         self._asked = np.full((len(reach), 3), np.inf)
         self._near: list[Numbers] = [np.empty(0, dtype=np.int64)] * len(reach)
 
-    def moved(self, position: Array, orientation: Array, centres: Array, meets: Mask) -> bool:
+    def moved(self, frame: Pose, centres: Array, meets: Mask) -> bool:
         """Search the ground below the shapes in `meets` that have moved too far. True if there were any.
 
-        The field's collider is at `position` and `orientation`, xyzw. The shapes are at `centres` (n, 3) in the world.
+        The field's collider is at `frame`. The shapes are at `centres` (n, 3) in the world.
         """
-        turn = composed(orientation, self.ground.orientation)
-        origin = position + rotated(orientation, self.ground.position)
-        local = rotated(turn * [-1.0, -1.0, -1.0, 1.0], centres - origin)
-        meets = meets & np.isfinite(self._reach)
+        origin, turn = _core.world_poses([frame], FIRST, self.ground.position[None], self.ground.orientation[None])
+        local = rotated(turn * BACK, centres - origin)
+        meets = meets & np.isfinite(self._reach) & np.isfinite(local).all(axis=1)
         moved = meets & ~(np.abs(local - self._asked).max(axis=1) <= self._slack)
         self._asked[moved] = local[moved]
         for k in np.flatnonzero(moved):
@@ -49,26 +50,27 @@ class GroundBelow:
 
 
 class Grounds:
-    """The height fields among the bodies, and the shapes that may meet them: those of all other bodies."""
+    """The height fields of the bodies by (body, link), and the shapes that may meet them: all but height fields."""
 
     def __init__(self) -> None:
-        self._below: dict[int, GroundBelow] = {}
+        self._below: dict[LinkKey, GroundBelow] = {}
         self._rows = np.empty(0, dtype=np.intp)
         self._keys = np.empty((0, 3), dtype=np.int64)
         self._shapes: list[Shape] = []
 
     def follow(self, layout: Layout, bodies: Mapping[int, ModelledBody]) -> None:
         """Follow a new layout, after bodies have come or gone."""
-        grounds = {id: body.ground for id, body in bodies.items() if body.ground and (id, BASE) in layout.collider_rows}
-        self._rows = np.flatnonzero(~np.isin(layout.owners, [*grounds]))
+        grounds = {(id, ground.link): ground for id, body in bodies.items() for ground in body.grounds}
+        own = [layout.collider_rows[each] for each in grounds]
+        self._rows = np.flatnonzero(~np.isin(layout.colliders, own))
         shapes = [layout.shapes[row] for row in self._rows] if grounds else []
         keys = layout.key_rows[self._rows]
         if shapes != self._shapes or not np.array_equal(keys, self._keys):
             self._below = {}
         self._shapes, self._keys = shapes, keys
-        same = {id: below for id, below in self._below.items() if below.ground is grounds.get(id)}
+        same = {key: below for key, below in self._below.items() if below.ground is grounds.get(key)}
         reach = layout.reach(self._rows) if len(same) < len(grounds) else np.empty(0)
-        self._below = {id: same.get(id) or GroundBelow(ground, reach) for id, ground in grounds.items()}
+        self._below = {key: same.get(key) or GroundBelow(ground, reach) for key, ground in grounds.items()}
 
     def changed(self, layout: Layout, rules: Rules, bodies: Mapping[int, ModelledBody]) -> dict[int, ModelledBody]:
         """The height fields that need more prisms, or fewer than half of their prisms, with the new prisms.
@@ -77,14 +79,16 @@ class Grounds:
         """
         found: dict[int, ModelledBody] = {}
         colliders = layout.colliders[self._rows]
-        for id, below in self._below.items():
-            own = np.full(len(colliders), layout.collider_rows[id, BASE])
+        for (id, link), below in self._below.items():
+            own = np.full(len(colliders), layout.collider_rows[id, link])
             meets = rules.allow(np.minimum(own, colliders), np.maximum(own, colliders))
-            if not below.moved(*layout.frame(id), layout.positions[self._rows], meets):
+            if not below.moved(layout.frame((id, link)), layout.positions[self._rows], meets):
                 continue
-            modelled, needed = {each.index: each for each in bodies[id].shapes}, below.numbers()
+            body, needed = found.get(id, bodies[id]), below.numbers()
+            modelled = {each.index: each for each in body.shapes if each.link == link}
             if needed - modelled.keys() or 2 * len(needed) < len(modelled):
-                ground = below.ground
-                prisms = (modelled.get(number) or ground.prism(number) for number in sorted(needed))
-                found[id] = replace(bodies[id], shapes=tuple(prisms))
+                prisms = [modelled.get(number) or below.ground.prism(number) for number in needed]
+                others = [each for each in body.shapes if each.link != link]
+                shapes = sorted([*others, *prisms], key=lambda each: (each.link, each.index))
+                found[id] = replace(body, shapes=tuple(shapes))
         return found

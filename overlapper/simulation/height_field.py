@@ -1,9 +1,8 @@
-"""Height fields: a grid of heights with two triangles per cell, and solid ground below them."""
+"""Height fields: a grid of heights with two triangles per cell, and solid ground below them, down to a flat base."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +19,15 @@ class HeightField:
     """The ground under a grid of heights, in the frame of its shape.
 
     `heights` (c, r) in m are those at x = (i - (r - 1) / 2) * spacing[0], y = (j - (c - 1) / 2) * spacing[1] for row j
-    and column i of the array. Each cell is cut into two triangles, from its corner at i + 1 to its corner at j + 1. The
-    triangles of the cell (i, j) have the numbers n = 2 * (j * (r - 1) + i) and n + 1.
+    and column i of the array. Each cell is cut into two triangles, from its corner at i + 1 to its corner at j + 1, or
+    with `rising` from its corner (i, j) to its corner (i + 1, j + 1). The triangles of the cell (i, j) have the numbers
+    n = 2 * (j * (r - 1) + i) and n + 1. The bottom of the ground is at z = `base`, m.
     """
 
     heights: Array
     spacing: tuple[float, float]
+    base: float
+    rising: bool = False
     middle: float = 0.0
     """The height that the simulator has subtracted from the given heights, m."""
 
@@ -34,12 +36,6 @@ class HeightField:
         """The number of triangles."""
         columns, rows = self.heights.shape
         return int(2 * (columns - 1) * (rows - 1))
-
-    @cached_property
-    def base(self) -> float:
-        """The bottom of the solid ground, m. It is as far below the lowest point as the field is wide."""
-        columns, rows = self.heights.shape
-        return float(self.heights.min() - max((rows - 1) * self.spacing[0], (columns - 1) * self.spacing[1]))
 
     def under(self, lower: Array, upper: Array) -> Numbers:
         """The numbers of the triangles whose ground a box may meet; `lower` and `upper` are corners of the box."""
@@ -59,7 +55,8 @@ class HeightField:
         """The ground below a triangle, down to the base."""
         columns, rows = self.heights.shape
         j, i = divmod(number // 2, rows - 1)
-        corners = [(i + 1, j), (i, j + 1), (i + 1, j + 1) if number % 2 else (i, j)]
+        cut = [(i, j), (i + 1, j + 1)] if self.rising else [(i + 1, j), (i, j + 1)]
+        corners = [*cut, (i + (number % 2 != self.rising), j + number % 2)]
         flat = [((u - (rows - 1) / 2) * self.spacing[0], (v - (columns - 1) / 2) * self.spacing[1]) for u, v in corners]
         tops = [self.heights[v, u] for u, v in corners]
         return Hull([(*at, z) for at, top in zip(flat, tops) for z in (top, self.base)])

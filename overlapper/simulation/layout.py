@@ -43,7 +43,7 @@ class Layout:
         self, bodies: Mapping[int, ModelledBody], poses: Callable[[Mapping[int, Sequence[int]]], Poses]
     ) -> None:
         """`poses` makes the reader of the frames of bodies and their links."""
-        shaped = {id: body.shapes for id, body in bodies.items() if body.shapes or body.ground}
+        shaped = {id: body.shapes for id, body in bodies.items() if body.shapes or body.grounds}
         modelled = [each for shapes in shaped.values() for each in shapes]
         self.keys = [(id, each.link, each.index) for id, shapes in shaped.items() for each in shapes]
         self.key_rows = np.array(self.keys, dtype=np.int64).reshape(-1, 3)
@@ -53,7 +53,9 @@ class Layout:
         self._local_orientations = np.array([each.orientation for each in modelled]).reshape(-1, 4)
         self.positions: Array = np.full_like(self._local_positions, np.nan)
         self.orientations: Array = np.full_like(self._local_orientations, np.nan)
-        links = {id: sorted({each.link for each in shapes} - {BASE}) for id, shapes in shaped.items()}
+        links = {
+            id: sorted({each.link for each in (*shapes, *bodies[id].grounds)} - {BASE}) for id, shapes in shaped.items()
+        }
         self.poses = poses(links)
         self._read: Sequence[Pose] = ()
         self.collider_rows = {each: row for row, each in enumerate(sorted(self.poses.colliders))}
@@ -63,10 +65,9 @@ class Layout:
         self.owners = np.array([id for id, _, _ in self.keys], dtype=int)
         self.of_several_colliders = [id for id, each in links.items() if each]
 
-    def frame(self, body: int) -> tuple[Array, Array]:
-        """Position (3,) and quaternion (4,) of a base at the last `pose`."""
-        position, orientation = self._read[self._place[body, BASE]][:2]
-        return np.array(position), np.array(orientation)
+    def frame(self, collider: LinkKey) -> Pose:
+        """The frame of a collider at the last `pose`."""
+        return self._read[self._place[collider]]
 
     def reach(self, rows: NDArray[np.intp]) -> Array:
         """(n,) how far the shapes in these rows extend from their own origins, m; infinite for planes."""

@@ -115,22 +115,23 @@ class ModelledShape:
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """A height field, placed in the frame of its collider."""
+    """A height field of a link, placed in the frame of its collider."""
 
+    link: int
     field: HeightField
     position: Array
     orientation: Array
 
     def prism(self, number: int) -> ModelledShape:
-        return ModelledShape(BASE, number, self.field.prism(number), self.position, self.orientation)
+        return ModelledShape(self.link, number, self.field.prism(number), self.position, self.orientation)
 
 
 @dataclass(frozen=True, slots=True)
 class ModelledBody:
     """A body: `link_names`, `colors` and `parents` by link. `shape_count` is its number of shapes, modelled or not.
 
-    `look` has colour and size in words, for a body that is named after its kind of shape. The `ground` of a body is its
-    height field. `shapes` are then the prisms of the ground that are modelled so far.
+    `look` has colour and size in words, for a body that is named after its kind of shape. `grounds` are its height
+    fields. The shapes of their links are the prisms of the ground that are modelled so far.
     """
 
     name: str
@@ -141,5 +142,5 @@ class ModelledBody:
     shapes: tuple[ModelledShape, ...]
     skipped: tuple[Skipped, ...] = ()
     decomposed: tuple[Decomposed, ...] = ()
-    ground: Ground | None = None
+    grounds: tuple[Ground, ...] = ()
     look: tuple[str, str] = ("", "")

@@ -215,8 +215,10 @@ def test_a_mesh_is_the_hull_of_its_graph():
 def test_what_is_not_modelled_is_named_once(tmp_path):
     xml = """<mujoco><asset><hfield name="h" nrow="2" ncol="2" size="1 1 .1 .1"/></asset>
     <worldbody><geom name="hills" type="hfield" hfield="h"/><geom name="ball" size=".1"/></worldbody></mujoco>"""
-    with pytest.warns(SkippedShapeWarning, match=r"world/hills \(body 0, link 0\) is left out: height") as told:
-        bodies = Bodies(*simulated(xml))
+    model, data = simulated(xml)
+    model.hfield_size[0, 3] = 0
+    with pytest.warns(SkippedShapeWarning, match=r"world/hills \(body 0, link 0\) is left out: its height") as told:
+        bodies = Bodies(model, data)
     assert told[0].filename == __file__ and len(told) == 1
     bodies.update()
     assert [each.name for each in bodies.skipped] == ["world/hills"] and len(bodies.shapes) == 1

@@ -70,10 +70,10 @@ def read_body(
     skipped: list[Skipped] = []
     decomposed: list[Decomposed] = []
     shape_count = 0 if saved else 1
-    ground = None
+    grounds: tuple[Ground, ...] = ()
     if field and [leaf.kind for leaf in leaves.get(BASE, ())] == ["height field"]:
         (leaf,) = leaves.pop(BASE)
-        ground = Ground(field, leaf.position, leaf.orientation)
+        grounds = (Ground(BASE, field, leaf.position, leaf.orientation),)
         shape_count += field.count
     for link, each in leaves.items():
         made, reasons, meshes = modelled(link, each, modelling)
@@ -102,7 +102,7 @@ def read_body(
         tuple(shapes),
         tuple(skipped),
         tuple(decomposed),
-        ground,
+        grounds,
         look(seen.get(BASE), shapes) if name == kind and not given else ("", ""),
     )
 

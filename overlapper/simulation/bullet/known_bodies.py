@@ -76,7 +76,7 @@ class KnownBodies:
         """Whether a base has another margin than before, if margins are modelled. Its body is then read anew."""
         if self._modelling.surface == "nominal":
             return False
-        shaped = {id for id, body in self.by_id.items() if body.shapes or body.ground}
+        shaped = {id for id, body in self.by_id.items() if body.shapes or body.grounds}
         watched = body_ids(self._client).intersection(shaped)
         changed = [id for id in watched if _margin(self._client, id) != self._margins[id]]
         for id in changed:
@@ -85,7 +85,7 @@ class KnownBodies:
 
     def _ground_changed(self) -> bool:
         """Whether a height field has been given other heights. Its body is then read anew."""
-        grounds = {id: body.ground for id, body in self.by_id.items() if body.ground}
+        grounds = {id: ground for id, body in self.by_id.items() for ground in body.grounds}
         for id, ground in grounds.items():
             if self._recorder and self._recorder.height_field(id) is not ground.field:
                 del self.by_id[id]

@@ -209,10 +209,13 @@ def height_field(
 ) -> HeightField:
     """The field that createCollisionShape makes of these heights, with `rows` heights along x.
 
-    Bullet puts the middle height at z = 0. A field that replaces the field `before` keeps the middle of that field.
+    Bullet puts the middle height at z = 0. A field that replaces the field `before` keeps the middle of that field. The
+    solid ground ends as far below the lowest point as the field is wide.
     """
     x, y, z = np.asarray(scale, dtype=float)
     # Bullet keeps the heights in single precision.
     plain = z * np.asarray(data, dtype=np.float32).astype(float).reshape(columns, rows)
     middle = before.middle if before else float(plain.min() + plain.max()) / 2
-    return HeightField(plain - middle, (float(x), float(y)), middle)
+    heights, spacing = plain - middle, (float(x), float(y))
+    depth = max((rows - 1) * spacing[0], (columns - 1) * spacing[1])
+    return HeightField(heights, spacing, float(heights.min()) - depth, middle=middle)

@@ -52,15 +52,17 @@ class Bodies(AnyBodies):
 
     Notes
     -----
-    Planes, spheres, capsules, ellipsoids, cylinders, boxes and meshes are modelled. A plane is infinite, as in MuJoCo's
-    collisions. A mesh is the convex hull that MuJoCo collides. Height fields, SDF plugins and flexes are in `skipped`,
-    with one SkippedShapeWarning each. Surfaces are nominal. MuJoCo's `contact.dist` is a distance of nominal surfaces,
-    too.
+    Planes, spheres, capsules, ellipsoids, cylinders, boxes, meshes and height fields are modelled. A plane is infinite,
+    as in MuJoCo's collisions. A mesh is the convex hull that MuJoCo collides. A height field has a prism below each of
+    its triangles. Only prisms near geoms that may collide with it are modelled. SDF plugins and flexes are in
+    `skipped`, with one SkippedShapeWarning each. Surfaces are nominal. MuJoCo's `contact.dist` is a distance of nominal
+    surfaces, too.
 
-    Keys are (body, geom, 0) in MuJoCo's numbers. Names are MuJoCo's: "torso" is a body, "torso/foot1" is a geom.
+    Keys are (body, geom, 0) in MuJoCo's numbers, and (body, geom, triangle) for prisms of a height field. Names are
+    MuJoCo's: "torso" is a body, "torso/foot1" is a geom.
 
     `update()` reads the poses of `data`. After mj_step these are the poses before its integration, as in
-    `data.contact`. mj_kinematics brings them up to date. Edited sizes, types and meshes of geoms are noticed.
+    `data.contact`. mj_kinematics brings them up to date. Edited sizes, types, meshes and heights are noticed.
 
     Pairs are those that mj_collision looks at, by masks, welds, parents, excludes, explicit pairs, flags and a
     contact filter in Python, at the last update. `pairs` and `overlaps` take other choices.
@@ -105,7 +107,8 @@ class Bodies(AnyBodies):
             Whether a contact of the pair in `data.contact` has a negative `dist`. If MuJoCo does not test the pair, the
             sign of the distance decides.
         distances : ndarray, shape (n,)
-            The distances of `mj_geomDistance`, m. They are negative for pairs that overlap.
+            The distances of `mj_geomDistance`, m. They are negative for pairs that overlap. They are NaN for parts of
+            height fields.
 
         Examples
         --------

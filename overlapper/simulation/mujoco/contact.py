@@ -18,7 +18,8 @@ class GeomContact(Contact):
     Parameters
     ----------
     bodyA, linkA, shapeA : int
-        Number of the first body and of its geom, and 0. In tables, a geom has the column of a link. `geomA` is `linkA`.
+        Number of the first body and of its geom, and 0. In a height field, `shapeA` is the number of the triangle. In
+        tables, a geom has the column of a link. `geomA` is `linkA`.
     bodyB, linkB, shapeB : int
         Those of the second geom.
     overlap : Overlap

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper.simulation.mujoco.geoms import HFIELD
 from overlapper.simulation.mujoco.pair_rule import NO_CONTACTS, PairRule, contact_filter
 
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
@@ -17,13 +18,14 @@ FAR = 1e10  # m; mj_geomDistance searches as far as this
 def own_distances(model: Any, data: Any, pairs: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """(n,) whether the pairs (n, 2) of geoms overlap by MuJoCo, and (n,) their signed distances, m.
 
-    A pair overlaps if one of its contacts has a negative `dist`. If MuJoCo does not test the pair, the sign of the
-    distance decides.
+    The distance from a height field is NaN. A pair overlaps if one of its contacts has a negative `dist`. If MuJoCo
+    does not test the pair, the sign of the distance decides.
     """
     least: dict[tuple[int, ...], float] = {}
     for geoms, distance in zip(np.sort(data.contact.geom, axis=1).tolist(), data.contact.dist.tolist()):
         least[tuple(geoms)] = min(distance, least.get(tuple(geoms), distance))
     distances = np.array([_signed_distance(model, data, *pair) for pair in pairs.tolist()], dtype=float)
+    distances[(model.geom_type[pairs] == HFIELD).any(axis=1)] = np.nan
     untested = np.where(_tested(model, data, pairs), 0.0, distances).tolist()
     asked = map(tuple, np.sort(pairs, axis=1).tolist())
     return np.array([least.get(pair, other) < 0 for pair, other in zip(asked, untested)], dtype=bool), distances

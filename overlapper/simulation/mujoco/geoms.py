@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Shape, Sphere
 from overlapper.printable import printable
-from overlapper.simulation.model import BASE, Color, ModelledBody, ModelledShape, Skipped
+from overlapper.simulation.height_field import HeightField
+from overlapper.simulation.model import BASE, Color, Ground, ModelledBody, ModelledShape, Skipped
 
 Numbers = NDArray[np.int64]
 
@@ -23,10 +24,8 @@ TYPES = {
 }
 """The MJCF names of the types of geoms, by number."""
 
-NOT_MODELLED = {
-    "hfield": "height fields are not modelled",
-    "sdf": "its surface comes from an SDF plugin, which Python cannot read",
-}
+PLANE, HFIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
+NOT_MODELLED = {"sdf": "its surface comes from an SDF plugin, which Python cannot read"}
 ORIGIN, UNTURNED = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
 
 
@@ -39,11 +38,12 @@ def collidable(model: Any) -> Numbers:
 
 def drawn_from(model: Any) -> bytes:
     """All numbers of the model that define shapes. They may be edited at any time."""
-    return b"".join(each.tobytes() for each in (model.geom_size, model.geom_type, model.geom_dataid))
+    arrays = model.geom_size, model.geom_type, model.geom_dataid, model.hfield_size, model.hfield_data
+    return b"".join(each.tobytes() for each in arrays)
 
 
 def modelled_bodies(model: Any, geoms: Numbers, names: dict[int, str]) -> dict[int, ModelledBody]:
-    """The bodies of these geoms by number. Each geom has one shape or a reason why it has none.
+    """The bodies of these geoms by number. Each geom has one shape, a height field, or a reason why it has neither.
 
     `names` are given names of bodies by number. The other bodies have MuJoCo's names.
     """
@@ -59,13 +59,19 @@ def _modelled_body(model: Any, body: int, geoms: Iterable[int], given: str | Non
     geom_names = {geom: printable(model.geom(geom).name) or f"geom {geom}" for geom in geoms}
     shapes: list[ModelledShape] = []
     skipped: list[Skipped] = []
+    grounds: list[Ground] = []
     for geom in geoms:
         try:
+            if model.geom_type[geom] == HFIELD:
+                grounds.append(Ground(geom, height_field(model, int(model.geom_dataid[geom])), ORIGIN, UNTURNED))
+                continue
             shapes.append(ModelledShape(geom, 0, shape_of(model, geom), ORIGIN, UNTURNED))
         except ValueError as error:
             skipped.append(Skipped(body, geom, f"{name}/{geom_names[geom]}", str(error)))
     colors = {geom: color_of(model, geom) for geom in geoms}
-    return ModelledBody(name, {BASE: "", **geom_names}, colors, {}, len(geom_names), tuple(shapes), tuple(skipped))
+    count = len(shapes) + len(skipped) + sum(ground.field.count for ground in grounds)
+    links = {BASE: "", **geom_names}
+    return ModelledBody(name, links, colors, {}, count, tuple(shapes), tuple(skipped), grounds=tuple(grounds))
 
 
 def color_of(model: Any, geom: int) -> Color:
@@ -96,6 +102,21 @@ def shape_of(model: Any, geom: int) -> Shape:
             return _hull(hull_points(model, int(model.geom_dataid[geom])).tobytes())
         case _:
             raise ValueError(NOT_MODELLED.get(kind, f"geoms of type {kind} are not modelled"))
+
+
+def height_field(model: Any, number: int) -> HeightField:
+    """The height field with this number, as MuJoCo collides it. ValueError if its heights are not above its base.
+
+    `hfield_size` has half the widths along x and y, the height of data 1, and the depth of the base. See
+    mjc_ConvexHField in engine_collision_convex.c.
+    """
+    rows, columns = int(model.hfield_nrow[number]), int(model.hfield_ncol[number])
+    x, y, top, depth = model.hfield_size[number].tolist()
+    first = int(model.hfield_adr[number])
+    heights = top * model.hfield_data[first : first + rows * columns].reshape(rows, columns).astype(float)
+    if not (np.isfinite(heights).all() and heights.min() > -depth and min(x, y) > 0):
+        raise ValueError("its heights must be finite and above its base, and its widths positive")
+    return HeightField(heights, (2 * x / (columns - 1), 2 * y / (rows - 1)), -depth, rising=True)
 
 
 def hull_points(model: Any, mesh: int) -> NDArray[np.float64]:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.simulation.collision_rules import Indices, Mask
+from overlapper.simulation.mujoco.geoms import HFIELD, PLANE
 from overlapper.simulation.mujoco.silence import asked_flags
 
-PLANE, HFIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
 ROWS = 1 << 20  # pairs counted at a time
 TABLED = 256  # the most geoms whose pairs are decided in advance

@@ -54,7 +54,8 @@ def mechanism(model: Any, name: str) -> Mechanism:
     for body in range(model.nbody):
         told = shaped.get(body)
         reasons = [each.reason for each in told.skipped] if told else []
-        about = in_one_sentence(reasons, told.shape_count) if told and reasons else ""
+        reasons += ["height fields are not modelled"] * len(told.grounds) if told else []
+        about = in_one_sentence(reasons, len(told.shapes) + len(reasons)) if told and reasons else ""
         link = made.add(body, about)
         for each in told.shapes if told else ():
             geom_pose = model.geom_pos[each.link].copy(), _xyzw(model.geom_quat[each.link])
