@@ -54,7 +54,8 @@ class Layout:
         self.positions: Array = np.full_like(self._local_positions, np.nan)
         self.orientations: Array = np.full_like(self._local_orientations, np.nan)
         links = {
-            id: sorted({each.link for each in (*shapes, *bodies[id].grounds)} - {BASE}) for id, shapes in shaped.items()
+            id: sorted(({each.link for each in shapes} | {each.link for each in bodies[id].grounds}) - {BASE})
+            for id, shapes in shaped.items()
         }
         self.poses = poses(links)
         self._read: Sequence[Pose] = ()
