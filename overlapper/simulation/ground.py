@@ -14,7 +14,7 @@ from overlapper.simulation.height_field import Numbers
 from overlapper.simulation.layout import Layout, Pose
 from overlapper.simulation.model import Array, Ground, LinkKey, ModelledBody
 
-FIRST, BACK = np.zeros(1, dtype=np.int64), np.array([-1.0, -1.0, -1.0, 1.0])
+FIRST = np.zeros(1, dtype=np.int64)
 
 
 class GroundBelow:
@@ -27,6 +27,7 @@ class GroundBelow:
         # The ground is modelled this far around a shape, and searched again when the shape has moved this far.
         self._slack = np.maximum(min(ground.field.spacing) / 2, reach / 4)
         self._asked = np.full((len(reach), 3), np.inf)
+        self._frame: Pose = ()
         self._near: list[Numbers] = [np.empty(0, dtype=np.int64)] * len(reach)
 
     def moved(self, frame: Pose, centres: Array, meets: Mask) -> bool:
@@ -34,8 +35,11 @@ class GroundBelow:
 
         The field's collider is at `frame`. The shapes are at `centres` (n, 3) in the world.
         """
-        origin, turn = _core.world_poses([frame], FIRST, self.ground.position[None], self.ground.orientation[None])
-        local = rotated(turn * BACK, centres - origin)
+        if frame != self._frame:
+            ground, self._frame = self.ground, frame
+            self._origin, turn = _core.world_poses([frame], FIRST, ground.position[None], ground.orientation[None])
+            self._axes = rotated(turn, np.eye(3)).T
+        local = (centres - self._origin) @ self._axes
         meets = meets & np.isfinite(self._reach) & np.isfinite(local).all(axis=1)
         moved = meets & ~(np.abs(local - self._asked).max(axis=1) <= self._slack)
         self._asked[moved] = local[moved]
