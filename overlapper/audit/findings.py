@@ -44,7 +44,7 @@ def remarks(robot: Robot) -> list[str]:
     links = [(name, link) for name, link in zip(robot.link_names, robot.tree.links)]
     lines = [f"Concave: {name} is {link.concave} convex parts." for name, link in links if link.concave]
     for kind, name in robot.unmoved:
-        why = "pybullet does not move it" if kind == "planar" else "it has no limits"
+        why = "planar joints are not moved" if kind == "planar" else "it has no limits"
         lines.append(f"The {kind} joint {name} stays at rest, because {why}.")
     return [*lines, *robot.notes]
 

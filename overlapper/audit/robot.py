@@ -15,12 +15,14 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper.install import hint, simulator_hint
 from overlapper.jobs.confined import MEGABYTES, SECONDS, Confined, Unanswered
 from overlapper.printable import first_line
 from overlapper.simulation.bullet.joints import ENDINGS, kinematic_tree
 from overlapper.simulation.bullet.model_file import NotRead, read_apart
 from overlapper.simulation.bullet.model_text import root_of
 from overlapper.simulation.kinematic_tree import KinematicTree, Mimic
+from overlapper.simulation.naming import body_name
 from overlapper.simulation.settings import Modelling
 
 TURN = ("x", "y", "z", "w")  # the quaternion of a spherical joint
@@ -135,12 +137,15 @@ def not_modelled(robot: Robot) -> dict[str, str]:
 def read_robot(path: Path, modelling: Modelling = Modelling()) -> Robot:  # noqa: B008
     """The robot of a URDF, SDF or MJCF file.
 
-    MuJoCo's compiler reads MJCF if it is installed, else pybullet does. pybullet ignores mimic joints, so those of a
-    URDF are read from its text. NotRead if the reader refuses the file, or if pybullet reads something else than the
-    file says. NotRead also if a joint mimics a joint that does not exist, or mimics itself through others.
+    MuJoCo's compiler reads MJCF if it is installed, else pybullet does. yourdfpy reads URDF if pybullet is not
+    installed. pybullet ignores mimic joints, so those of a URDF are read from its text. NotRead if the reader refuses
+    the file, or if pybullet reads something else than the file says. NotRead also if a joint mimics a joint that does
+    not exist, or mimics itself through others. ImportError if no library is installed that reads the file.
     """
     if path.suffix.lower() == ".xml" and find_spec("mujoco"):
         return _compiled(path, modelling)
+    if path.suffix.lower() == ".urdf" and not find_spec("pybullet"):
+        return _by_yourdfpy(path, modelling)
     found: Robot = read_apart(path, _answers, (path, modelling), ENDINGS)
     return found
 
@@ -165,6 +170,24 @@ def _compiled(path: Path, modelling: Modelling) -> Robot:
     return Robot(found.name, found.tree, mimics, found.notes)
 
 
+def _by_yourdfpy(path: Path, modelling: Modelling) -> Robot:
+    """The robot of a URDF file by yourdfpy, in a process of its own. Shapes are modelled in this process."""
+    if not find_spec("yourdfpy"):
+        raise ImportError(f"a URDF file needs {hint('yourdfpy')}, or {simulator_hint()}")
+    from overlapper.simulation.urdf import kinematic_tree, read_links
+
+    if not path.is_file():
+        raise NotRead(f"there is no file {path}")
+    try:
+        root, links = _reading(read_links, path.absolute())
+        tree = kinematic_tree(body_name(root.get("name", ""), str(path), True, (), None), links, modelling)
+        return _of_urdf(root, tree)
+    except Unanswered as error:
+        raise NotRead(f"{path} cannot be read: yourdfpy {error}") from None
+    except (NotRead, ValueError) as error:
+        raise NotRead(f"{path} cannot be read: {first_line(error)}") from None
+
+
 _reading = Confined(SECONDS, MEGABYTES)
 
 
@@ -175,13 +198,20 @@ def _answers(request: tuple[Path, Modelling]) -> Generator[Robot | str, None, No
         root = root_of(path)
         tree = yield from kinematic_tree(path, root, modelling)
         if path.suffix.lower() == ".urdf":
-            yield Robot(root.get("name") or tree.bodies[0], tree, _mimics(root, tree))
+            yield _of_urdf(root, tree)
         else:
             tied = root.find("equality/*") is not None
             notes = ("The <equality> of the file is not read: the joints that it couples move freely.",) if tied else ()
             yield Robot(tree.bodies[0], tree, {}, notes)
     except (NotRead, ValueError) as error:
         yield str(error)
+
+
+def _of_urdf(root: ElementTree.Element, tree: KinematicTree) -> Robot:
+    """The robot of a URDF whose text has this root."""
+    limits = root.find("joint/safety_controller") is not None
+    notes = ("The soft limits of <safety_controller> are not read: joints move between their <limit>s.",) * limits
+    return Robot(root.get("name") or tree.bodies[0], tree, _mimics(root, tree), notes)
 
 
 def _mimics(root: ElementTree.Element, tree: KinematicTree) -> dict[str, Mimic]:

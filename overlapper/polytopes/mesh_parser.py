@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from io import BytesIO
+from itertools import count
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -93,6 +94,25 @@ def triangles(path: Path) -> Array:
     return np.asarray(mesh.triangles, dtype=float)
 
 
+def objects(path: Path) -> list[tuple[Array, NDArray[np.int64]]]:
+    """Vertices (n, 3) and triangles (t, 3) of a mesh, in m if the file states its unit; of each object of an OBJ file.
+
+    Vertices need not belong to a triangle.
+    """
+    import trimesh
+
+    obj = path.suffix.lower() == ".obj"
+    with _scene(path, **{"split_objects": True} if obj else {}) as scene:
+        to_metres = trimesh.units.unit_conversion(scene.units or "m", "m")
+        # Objects have numbers as names, except for one before the first name.
+        numbered = sorted((int(name) if name.isdigit() else -1, name) for name in scene.geometry) if obj else []
+        meshes = [scene.geometry[name] for _, name in numbered] if obj else [scene.to_mesh()]
+        found = [(to_metres * np.asarray(mesh.vertices), np.asarray(mesh.faces)) for mesh in meshes if len(mesh.faces)]
+    if not found:
+        raise ValueError("it has no triangles")
+    return found
+
+
 def hull(path: Path) -> tuple[Hull, bool, float]:
     """The hull of everything in a mesh file, whether the mesh is closed, and the share of the hull that it fills."""
     with _scene(path) as scene:
@@ -113,7 +133,8 @@ def _scene(path: Path, **options: Any) -> Iterator[Any]:
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         if path.suffix.lower() == ".obj":
-            yield trimesh.load_scene(BytesIO(_of_few_materials(path.read_bytes())), file_type="obj", **options)
+            text = (_numbered if "split_objects" in options else _of_few_materials)(path.read_bytes())
+            yield trimesh.load_scene(BytesIO(text), file_type="obj", **options)
         else:
             yield trimesh.load_scene(str(path), **options)
 
@@ -140,6 +161,13 @@ def _of_few_materials(text: bytes) -> bytes:
     if text.count(b"usemtl") <= MOST_MATERIALS:
         return text
     return re.sub(rb"^usemtl[^\r\n]*", b"", text, flags=re.MULTILINE)
+
+
+def _numbered(text: bytes) -> bytes:
+    """The text of an OBJ file without its materials. Each object and group has its own number as its name."""
+    numbers = count()
+    named = re.sub(rb"^[og](?=[ \t\r\n])[^\r\n]*", lambda _: b"o %d" % next(numbers), text, flags=re.MULTILINE)
+    return re.sub(rb"^usemtl[^\r\n]*", b"", named, flags=re.MULTILINE)
 
 
 def _must_fit(path: Path) -> None:

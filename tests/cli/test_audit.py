@@ -216,5 +216,5 @@ def test_unmoved_joints_and_unmodelled_shapes_are_reported(tmp_path):
     assert [*not_modelled(robot)] == ["flat"]
     assert remarks(robot) == [
         "The prismatic joint slide stays at rest, because it has no limits.",
-        "The planar joint table stays at rest, because pybullet does not move it.",
+        "The planar joint table stays at rest, because planar joints are not moved.",
     ]

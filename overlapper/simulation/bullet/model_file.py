@@ -18,7 +18,7 @@ ENDINGS = (".urdf", ".sdf", ".xml", ".bullet")
 
 
 class NotRead(Exception):
-    """pybullet cannot read a file. The message is one sentence."""
+    """A file cannot be read. The message is one sentence."""
 
 
 def read_apart(

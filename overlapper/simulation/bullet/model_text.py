@@ -66,8 +66,7 @@ def must_be_sound(path: Path, root: Element) -> None:
     include other files. An MJCF file may have elements that the importer changes.
     """
     _must_not_be_broken(path.read_bytes())
-    for name in named_files(root):
-        _must_be_a_file(path, name)
+    must_name_files(path, root)
     ending = path.suffix.lower()
     if ending == ".xml" and (changed := misread(root)):
         raise NotRead(f"pybullet would read the MJCF file wrongly: {changed}")
@@ -75,12 +74,23 @@ def must_be_sound(path: Path, root: Element) -> None:
         what = (included.findtext("uri") or "another file").strip()
         raise NotRead(f"it has <include> of {printable(what)}, which pybullet drops")
     if ending == ".urdf":
-        for joint in root.findall("joint"):
-            _must_have_numbers(f"the joint {joint.get('name')!r}", joint, _checked(joint))
-        for link in root.findall("link"):
-            for collision in link.findall("collision"):
-                parts = {part.tag for part in collision.iter()} & NUMBERS.keys()
-                _must_have_numbers(f"a collision shape of the link {link.get('name')!r}", collision, parts)
+        must_have_finite_numbers(root)
+
+
+def must_name_files(path: Path, root: Element) -> None:
+    """NotRead if the model names a pipe, a device or a folder as a mesh or a picture."""
+    for name in named_files(root):
+        _must_be_a_file(path, name)
+
+
+def must_have_finite_numbers(root: Element) -> None:
+    """NotRead if a joint or a collision shape of a URDF has a number that is not finite, or an axis of length 0."""
+    for joint in root.findall("joint"):
+        _must_have_numbers(f"the joint {joint.get('name')!r}", joint, _checked(joint))
+    for link in root.findall("link"):
+        for collision in link.findall("collision"):
+            parts = {part.tag for part in collision.iter()} & NUMBERS.keys()
+            _must_have_numbers(f"a collision shape of the link {link.get('name')!r}", collision, parts)
 
 
 def named_files(root: Element) -> Iterator[str]:
@@ -112,7 +122,7 @@ def _must_be_a_file(model: Path, name: str) -> None:
 
 def found(model: Path, name: str) -> Path | None:
     """The first existing path among the places where pybullet looks for a name in a model."""
-    name = re.sub("^(package|model|file)://", "", name)
+    name = re.sub("^((package|model):/*|file://)", "", name)
     try:
         return next(
             (folder / name for folder in (*model.parents, Path(".."), Path("../..")) if (folder / name).exists()), None
