@@ -102,7 +102,9 @@ def everything(tmp_path):
         [('<box size=".1 .1 .1"/>', "")],
         [('<box size=".1 .2 .1"/>', "")],
     ]
-    links = [shaped(name, *each, inertial=OFFSET) for name, each in zip(names, shapes)]
+    # pybullet misplaces links of planar joints, and turns links of spherical joints, by their inertial frames.
+    odd = ("l3", "l6")
+    links = [shaped(name, *each, inertial=INERTIAL if name in odd else OFFSET) for name, each in zip(names, shapes)]
     more = ["<safety_controller/>" + limit(-1, 2), "", limit(-0.1, 0.4), "", "", "", "", limit(-2, 1)]
     axes = ["0 3 4", "1 0 0", "0 0 2", "0 0 1", "0 0 1", "0 0 1", "0 0 1", "1 1 1"]
     parents = [names[0], names[1], names[1], names[0], names[2], names[5], names[3], names[2]]
@@ -141,7 +143,7 @@ def test_audits_are_as_with_pybullet(name, monkeypatch):
         assert expected.met <= found.met <= expected.met + 4
         if expected.largest:
             volume, depth = expected.largest.contact.volume, expected.deepest.contact.depth
-            assert found.largest.contact.volume == pytest.approx(volume, rel=0.02, abs=1e-9)
+            assert found.largest.contact.volume == pytest.approx(volume, rel=0.02, abs=2e-7)
             assert found.deepest.contact.depth == pytest.approx(depth, rel=1e-3, abs=1e-4)
 
 
