@@ -42,7 +42,8 @@ Shape to_shape(nb::handle value, const std::string& name) {
   if (is_shape(value, shape)) return shape;
   if (nb::isinstance<Placed>(value))
     throw nb::type_error((name + " must be a bare shape, it is already placed").c_str());
-  const bool is_sequence = PySequence_Check(value.ptr()) && nb::hasattr(value, "__len__");  // a PointCloud has no length
+  const bool is_sequence =
+      PySequence_Check(value.ptr()) && nb::hasattr(value, "__len__");  // a PointCloud has no length
   const bool array_like = is_sequence || nb::hasattr(value, "__array__");
   if (!array_like || nb::isinstance<nb::str>(value) || nb::isinstance<nb::bytes>(value)) {
     if (is_mesh(value))
