@@ -166,10 +166,12 @@ def test_invalid_requests_are_refused_in_one_sentence(options, sentence, robot, 
 
 
 def test_without_pybullet_the_error_names_what_to_install(robot, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pybullet", None)
-    for ask in (command, shapes):
-        with pytest.raises(Refused, match=r"^overlapper.simulation needs pybullet: pip install pybullet"):
-            ask(robot)
+    for library in ("pybullet", "yourdfpy"):
+        monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(Refused, match=r"^a URDF file needs yourdfpy: pip install yourdfpy, or pybullet: pip install"):
+        command(robot)
+    with pytest.raises(Refused, match=r"^overlapper.simulation needs pybullet: pip install pybullet"):
+        shapes(robot)
 
 
 @pytest.mark.parametrize("ending", [".parquet", ".sqlite"])
