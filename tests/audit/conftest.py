@@ -1,6 +1,5 @@
-from importlib.util import find_spec
-
 import pytest
+from robots import without
 
 
 @pytest.fixture
@@ -13,7 +12,3 @@ def by_pybullet(monkeypatch):
 def by_yourdfpy(monkeypatch):
     """yourdfpy reads URDF, as where pybullet is not installed."""
     monkeypatch.setattr("overlapper.audit.robot.find_spec", without("pybullet"))
-
-
-def without(library):
-    return lambda name: None if name == library else find_spec(name)

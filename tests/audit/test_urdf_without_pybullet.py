@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 import trimesh
-from robots import INERTIAL, ROBOTS, joint, limit, link, mimic, turntable, urdf
+from robots import INERTIAL, ROBOTS, joint, limit, link, mimic, turntable, urdf, without
 
 from overlapper.audit.assets import read_asset
 from overlapper.audit.audit import audit
@@ -44,8 +44,6 @@ main()
 
 def read_twice(path, monkeypatch, modelling=NOMINAL):
     """The robot by pybullet and by yourdfpy."""
-    from conftest import without
-
     by_pybullet = read_robot(path, modelling)
     with monkeypatch.context() as patched:
         patched.setattr("overlapper.audit.robot.find_spec", without("pybullet"))
@@ -140,7 +138,7 @@ def test_audits_are_as_with_pybullet(name, monkeypatch):
     for expected, found in zip(by_pybullet, by_yourdfpy, strict=True):
         assert (found.names, found.pair.adjacent) == (expected.names, expected.pair.adjacent)
         # Bullet's hulls are smaller by the grid, so that some shallow overlaps are missed.
-        assert expected.met <= found.met <= expected.met + 4
+        assert expected.met <= found.met <= expected.met + 0.03 * 400
         if expected.largest:
             volume, depth = expected.largest.contact.volume, expected.deepest.contact.depth
             assert found.largest.contact.volume == pytest.approx(volume, rel=0.02, abs=2e-7)

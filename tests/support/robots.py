@@ -1,6 +1,7 @@
 """Robots as URDF text, and those that come with pybullet and with example-robot-data."""
 
 from importlib.metadata import distribution
+from importlib.util import find_spec
 from pathlib import Path
 
 import pybullet as p
@@ -10,6 +11,11 @@ DATA = Path(pybullet_data.getDataPath())
 ROBOTS = Path(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots"))
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+
+
+def without(library):
+    """A `find_spec` as where the library is not installed."""
+    return lambda name: None if name == library else find_spec(name)
 
 
 def link(name, *boxes):
