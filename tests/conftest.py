@@ -1,6 +1,5 @@
 """Hypothesis draws the same examples on every run; `--hypothesis-profile=explore` looks further, with new ones."""
 
-import os
 import signal
 from pathlib import Path
 
@@ -20,11 +19,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 HERE = Path(__file__).parent
-
-
-def pytest_xdist_auto_num_workers():
-    """One more than there are processors: many tests wait for processes that they have started."""
-    return (os.cpu_count() or 1) + 1
 
 
 def pytest_collection_modifyitems(items):

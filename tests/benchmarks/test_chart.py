@@ -118,7 +118,7 @@ def test_threads_of_a_peer_s_own_are_timed_by_the_clock_in_a_process_that_has_al
     assert [row.method for row in rows] == ["auto"] * 3 + ["manifold3d, by the clock"]
     assert float(rows[-1].us) > 0 and float(rows[-1].error) < 1e-12
     words = page.text(page.Results("", ["here, 2 cores"], rows, [])).split()
-    assert "its time by the clock on 2 processors" in " ".join(words)
+    assert "its wall-clock time on 2 processors" in " ".join(words)
 
 
 def test_a_wrong_volume_of_ours_is_noticed():

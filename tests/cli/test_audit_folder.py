@@ -126,9 +126,10 @@ def test_only_an_overlap_deeper_than_the_rounding_of_its_corners_counts(tmp_path
 
 
 def test_an_error_in_one_asset_does_not_stop_the_others(folder, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pybullet", None)
+    for library in ("pybullet", "yourdfpy"):
+        monkeypatch.setitem(sys.modules, library, None)
     table = read_asset(folder, folder / "robots" / "table.urdf", "mm", 0.0, Modelling())
-    assert table.failure.startswith("overlapper.simulation needs pybullet: pip install pybullet")
+    assert table.failure.startswith("a URDF file needs yourdfpy: pip install yourdfpy, or pybullet: ")
     assert read_asset(folder, folder / "cube.stl", "mm", 0.0, Modelling()).sound
 
 

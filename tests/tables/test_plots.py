@@ -41,7 +41,7 @@ def lines(panel):
     return {line.get_label(): (line.get_xdata().tolist(), line.get_ydata()) for line in panel.lines}
 
 
-PAIRS = ["box#2/link0 and box#3/link0", "box#0/link0 and box#1/link0"]
+PAIRS = ["box#2 and box#3", "box#0 and box#1"]
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
