@@ -1292,7 +1292,7 @@ class ContactSolver:
         The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
         without the patches; rows that are `damped` choose stability over energy. `ahead` has a pair for each link: the position
         of its centre of mass after the step, in m, if the coordinates keep their velocity, and the quaternion xyzw of its rotation
-        until then. It is needed for the trees of a simulator.
+        until then. The trees of a simulator need it if there are patches.
 
         (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
         last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and

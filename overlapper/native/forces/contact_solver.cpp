@@ -216,9 +216,9 @@ ContactSolver::Six ContactSolver::known_wrench(size_t patch) const {
   return last ? rows_[patch].local(last->wrench) : Six{{std::max(0.0, patches_[patch].force), 0, 0}, {}};
 }
 
-/// The share of a body's spin that moves its surface away from the contact. It is 1 if the contact keeps its place, as
-/// an edge about which the body tips, and 0 if the contact goes on with the centre of the body, as below a wheel. The
-/// velocities are those of the centre, and of the surface at the contact relative to the centre.
+/// The share of a body's spin that moves its surface away from the contact. It is 1 if the contact keeps its place. An
+/// edge about which the body tips does so. It is 0 if the contact goes on with the centre of the body, as below a
+/// wheel. The velocities are those of the centre, and of the surface at the contact relative to the centre.
 double ContactSolver::staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const {
   const Known* last = known(patch.key);
   if (!last || !(norm2(by_spin) > 0)) return 0;
@@ -270,8 +270,8 @@ double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span
 
 /// Extrapolates the wrenches after a sweep there and back (Nesterov 1983). It begins anew when the sweeps go against
 /// the extrapolation (O'Donoghue and Candès 2015). The next visits replace the wrenches, so these need not obey the
-/// laws. Without it, patches of one body that cannot all stick need thousands of sweeps: each sweep adds the same small
-/// wrench to those by which the patches hold each other, until one of them slides.
+/// laws. Without extrapolation, patches of one body that cannot all stick need thousands of sweeps. Each sweep adds the
+/// same small wrench to those by which the patches hold each other, until one patch slides.
 void ContactSolver::extrapolate(Momentum& momentum, std::span<Laws> laws, double duration,
                                 std::span<double> velocity) const {
   auto& [before, begun, weight] = momentum;

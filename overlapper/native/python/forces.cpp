@@ -121,7 +121,7 @@ nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_give
       ahead.push_back({pose.translation, pose.rotation});
     }
     if (ahead.size() != size_t(solver.bodies().links())) fail("ahead", "must be one for each link");
-  } else if (!solver.bodies().has_links()) {
+  } else if (count > 0 && !solver.bodies().has_links()) {
     fail("ahead", "must be given for the trees of a simulator");
   }
   ContactSolver::Solution solution;
@@ -248,7 +248,7 @@ stiffness in Pa/m, dissipation in s, and the coefficient of friction. The answer
       R"(The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
 without the patches; rows that are `damped` choose stability over energy. `ahead` has a pair for each link: the position
 of its centre of mass after the step, in m, if the coordinates keep their velocity, and the quaternion xyzw of its rotation
-until then. It is needed for the trees of a simulator.
+until then. The trees of a simulator need it if there are patches.
 
 (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
 last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and

@@ -63,7 +63,7 @@ std::pair<Vec3, Quaternion> matrix_pose(std::span<const double, 16> matrix, cons
   const double cosine = std::max({std::abs(dot(x, y)), std::abs(dot(y, z)), std::abs(dot(z, x))});
   if (cosine > kMostOff)
     fail(name, "must have right angles between its axes: the cosine of an angle is " + number(cosine));
-  // Of the four multiples of the quaternion, the one with the largest component loses no digits.
+  // Four multiples of the quaternion are known. The multiple with the largest component loses no digits.
   const double trace = x.x + y.y + z.z;
   const double largest = std::max({trace, x.x, y.y, z.z});
   Quaternion q;

@@ -405,7 +405,12 @@ class VolumetricContact:
         wrenches: Array
         dynamics = self._masses.dynamics
         force, torque, slip, normal, directed, wrenches, ours, self.sweeps, residual = dynamics.solver.solve(
-            duration, velocity, other, damped, self._layers.distributed, dynamics.ahead(duration, velocity)
+            duration,
+            velocity,
+            other,
+            damped,
+            self._layers.distributed,
+            dynamics.ahead(duration, velocity) if len(self._contacts) else None,
         )
         self._found = Forces(self._contacts, force, torque, slip, normal, directed, self._stiffness, residual)
         self._told.of_residual(residual, self.sweeps)

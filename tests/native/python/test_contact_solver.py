@@ -215,7 +215,7 @@ def test_invalid_steps_are_refused():
     with pytest.raises(ValueError, match=r"^ahead must be one for each link$"):
         solver.solve(0.01, rest, rest, undamped, False, [((0, 0, 0), TURN)])
     with pytest.raises(ValueError, match=r"^ahead must be given for the trees of a simulator$"):
-        cube_as_a_tree().solve(0.01, rest[:6], rest[:6], [], False)
+        placed(1e-4, solver=cube_as_a_tree())[0].solve(0.01, rest[:6], rest[:6], undamped, False)
     with pytest.raises(ValueError, match=r"^links must be places of links$"):
         solver.ahead(0.01, rest, np.array([2]), [(0, 0, 0)], [TURN])
     with pytest.raises(ValueError, match=r"^positions must have 3 numbers, not 6$"):
