@@ -127,7 +127,7 @@ class Watch:
         of_engine = engine_of(engine or engine_that_has(physicsClientId))
         if whole(every, "every") < 1:
             raise ValueError(f"every must be a number of steps from 1, not {every}")
-        if not 0 < rate < math.inf:
+        if not (isinstance(rate, (int, float)) and 0 < rate < math.inf):
             raise ValueError(f"rate must be a number of measurements a second above 0, not {rate!r}")
         if per not in get_args(Per):
             raise ValueError(f"per must be 'shape' or 'link', not {per!r}")

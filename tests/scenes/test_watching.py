@@ -130,6 +130,7 @@ def test_a_missing_body_raises_in_the_call_of_the_step(pile):
     [
         ({"every": 0}, ValueError, "every must be a number of steps from 1, not 0"),
         ({"rate": 0}, ValueError, "rate must be a number of measurements a second above 0, not 0"),
+        ({"rate": "60"}, ValueError, "rate must be a number of measurements a second above 0, not '60'"),
         ({"check": "gut"}, ValueError, "check must be 'fcl', 'mujoco' or None, not 'gut'"),
         ({"per": "body"}, ValueError, "per must be 'shape' or 'link', not 'body'"),
         ({"surface": "rough"}, ValueError, "surface must be"),
