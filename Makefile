@@ -27,7 +27,7 @@ run: $(VENV)/run ## build, run SCENE=franka_grasp, write out/franka_grasp.csv an
 	@$(VENV)/bin/overlapper run $(SCENE) --out out/$(SCENE).csv --html out/$(SCENE).html
 
 test: $(VENV)/dev ## build, pass all tests
-	@echo "All tests take ten to fifteen minutes on 2 processors"
+	@echo "All tests take about 13 minutes on 2 processors"
 	@$(PYTEST) --numprocesses=auto --dist=worksteal
 
 # For any Python that the package supports. auditwheel writes the required version of libc into the wheel's name.
