@@ -216,6 +216,7 @@ struct SharedPlanes {
   std::vector<Ends> ends;    ///< for each edge
   std::vector<char> raised;  ///< for each vertex: the region may reach beyond a facet there
   std::vector<Beside> beside;
+  std::vector<Vec3> normals;  ///< of the facets at a vertex
 };
 
 /// Cuts a rounded hull. Parts that the region does not reach are left out.
@@ -262,13 +263,9 @@ class RoundedCutter {
     for (int f = 0; f < facets(); ++f) cut_facet(f);
   }
   /// A wedge of a cylinder along each edge, and of a ball at each vertex.
-  void cut_edges_and_vertices() {
-    for (int e = 0; e < static_cast<int>(hull_.edges.size()); ++e) {
-      cancellation_point();
-      cut_edge(e);
-    }
-    cut_vertices();
-  }
+  void cut_edges_and_vertices() { cut_along_edges(&RoundedCutter::cut_edge, &RoundedCutter::cut_vertex); }
+  /// The parts of these wedges that matter for what the mitred polytope has outside them.
+  void cut_mitres() { cut_along_edges(&RoundedCutter::cut_mitre, &RoundedCutter::cut_mitred_vertex); }
 
  private:
   static constexpr int kNotPlaced = -1;
@@ -288,42 +285,78 @@ class RoundedCutter {
     cutter_.end();
   }
 
+  using Vertex = std::span<const SharedPlanes::Beside>;
+
+  void cut_along_edges(void (RoundedCutter::*cut_edge)(int), void (RoundedCutter::*cut_vertex)(Vertex)) {
+    for (int e = 0; e < static_cast<int>(hull_.edges.size()); ++e) {
+      cancellation_point();
+      const Edge& edge = hull_.edges[e];
+      const std::array<int, 2> both{edge.from, edge.to};
+      if (!near(both)) continue;
+      for (const int i : {0, 1})
+        if (shared_->raised[both[i]] && near(std::span(both).subspan(i, 1)))
+          shared_->beside.push_back({both[i], both[1 - i], e});
+      // Each direction between two normals points away from one of the two facets.
+      if (raised(edge.left) || raised(edge.right)) (this->*cut_edge)(e);
+    }
+    std::vector<SharedPlanes::Beside>& all = shared_->beside;
+    std::ranges::sort(all, {}, [](const SharedPlanes::Beside& b) { return std::pair(b.vertex, b.other); });
+    for (size_t i = 0, end; i < all.size(); i = end) {
+      for (end = i + 1; end < all.size() && all[end].vertex == all[i].vertex;) ++end;
+      (this->*cut_vertex)(std::span(all).subspan(i, end - i));
+    }
+  }
+
   /// A wedge of a cylinder along the edge.
   void cut_edge(int e) {
     const Edge& edge = hull_.edges[e];
-    const std::array<int, 2> both{edge.from, edge.to};
-    if (!near(both)) return;
-    for (const int i : {0, 1})
-      if (shared_->raised[both[i]] && near(std::span(both).subspan(i, 1)))
-        shared_->beside.push_back({both[i], both[1 - i], e});
-    // Each direction between two normals points away from one of the two facets.
-    if (!raised(edge.left) && !raised(edge.right)) return;
     const Vec3 a = hull_.vertices[edge.from], b = hull_.vertices[edge.to], way = unit(b - a);
-    const double length = norm(b - a);
-    const auto [least, most] = cutter_.heights({way, dot(way, b)});
-    if (least > 0 || most + length < 0) return;
+    if (!between_ends(e, way)) return;
     const Vec3 out_left = hull_.planes[edge.left].normal, out_right = hull_.planes[edge.right].normal;
     if (beyond(cross(out_left, way), a) || beyond(cross(way, out_right), a)) return;
-    if (inexact(edge.left) || inexact(edge.right)) charge_fold(dot(cross(out_left, out_right), way), length);
-    const SharedPlanes::Ends& ends = ends_of(e);
-    cutter_.begin();
-    cutter_.cylinder(DoubleDouble{0.5} * (wide(a) + wide(b)), ends.along, radius_,
-                     rounded(norm(wide_difference(b, a))) / 2);
-    cutter_.cut_outside(ends.from);
-    cutter_.cut_inside(ends.to);
+    if (inexact(edge.left) || inexact(edge.right)) charge_fold(dot(cross(out_left, out_right), way), norm(b - a));
+    begin_at_edge(e);
     // Seen from outside, the left facet is on the left of the edge, so its ring has the edge in this direction.
     if (!cutter_.empty()) cutter_.cut_outside(side(edge.left, edge.from));
     if (!cutter_.empty()) cutter_.cut_outside(side(edge.right, edge.to));
     cutter_.end();
   }
 
-  void cut_vertices() {
-    std::vector<SharedPlanes::Beside>& all = shared_->beside;
-    std::ranges::sort(all, {}, [](const SharedPlanes::Beside& b) { return std::pair(b.vertex, b.other); });
-    for (size_t i = 0, end; i < all.size(); i = end) {
-      for (end = i + 1; end < all.size() && all[end].vertex == all[i].vertex;) ++end;
-      cut_vertex(std::span(all).subspan(i, end - i));
+  /// Across the edge, the mitred polytope leaves the cylinder along two lines. Its part outside the cylinder lies
+  /// beyond the plane through both lines.
+  void cut_mitre(int e) {
+    // Up to this angle between the facets, that part is not worth a piece.
+    constexpr double kFlat = 1e-5;
+    const Edge& edge = hull_.edges[e];
+    const Vec3 a = hull_.vertices[edge.from], b = hull_.vertices[edge.to];
+    const std::array<Vec3, 2> normals{hull_.planes[edge.left].normal, hull_.planes[edge.right].normal};
+    const Mitre mitre = mitre_at(a, normals);
+    if (!reached(mitre) || !between_ends(e, unit(b - a))) return;
+    if (const double angle = norm(cross(normals[0], normals[1])); angle <= kFlat) {
+      const double area = radius_ * angle * angle * angle / 12 * norm(b - a);
+      cutter_.gap(radius_ * area, area);
+      return;
     }
+    begin_at_edge(e);
+    if (!cutter_.empty()) cut_beyond(mitre, 1);
+    cutter_.end();
+  }
+
+  /// Whether the region reaches between the ends of an edge with this direction.
+  bool between_ends(int e, Vec3 way) const {
+    const Vec3 a = hull_.vertices[hull_.edges[e].from], b = hull_.vertices[hull_.edges[e].to];
+    const auto [least, most] = cutter_.heights({way, dot(way, b)});
+    return least <= 0 && most + norm(b - a) >= 0;
+  }
+
+  void begin_at_edge(int e) {
+    const Vec3 a = hull_.vertices[hull_.edges[e].from], b = hull_.vertices[hull_.edges[e].to];
+    const SharedPlanes::Ends& ends = ends_of(e);
+    cutter_.begin();
+    cutter_.cylinder(DoubleDouble{0.5} * (wide(a) + wide(b)), ends.along, radius_,
+                     rounded(norm(wide_difference(b, a))) / 2);
+    cutter_.cut_outside(ends.from);
+    cutter_.cut_inside(ends.to);
   }
 
   /// Whether the region may reach beyond the facet.
@@ -363,19 +396,65 @@ class RoundedCutter {
   bool beyond(Vec3 normal, Vec3 point) const { return cutter_.heights({normal, dot(normal, point)}).first > 0; }
   int through(const WideVector& normal, Vec3 point) { return cutter_.place({normal, dot(normal, wide(point))}); }
 
-  void cut_vertex(std::span<const SharedPlanes::Beside> beside) {
-    const int v = beside[0].vertex;
-    const Vec3 vertex = hull_.vertices[v];
+  /// The part of the ball between the ends of the edges at a vertex.
+  void cut_vertex(Vertex beside) {
+    if (!reaches_vertex(beside)) return;
+    begin_at_vertex(beside);
+    cutter_.end();
+  }
+
+  void cut_mitred_vertex(Vertex beside) {
+    // A plane farther in leaves the points at which the polytope touches the ball off the plane.
+    constexpr double kFartherIn = 0.98;
+    shared_->normals.clear();
     for (const auto& [_, other, edge] : beside)
-      if (beyond(unit(hull_.vertices[other] - vertex), vertex)) return;
+      for (const int f : {hull_.edges[edge].left, hull_.edges[edge].right})
+        shared_->normals.push_back(hull_.planes[f].normal);
+    const Mitre mitre = mitre_at(hull_.vertices[beside[0].vertex], shared_->normals);
+    if (!reached(mitre) || !reaches_vertex(beside)) return;
+    begin_at_vertex(beside);
+    if (!cutter_.empty()) cut_beyond(mitre, kFartherIn);
+    cutter_.end();
+  }
+
+  bool reaches_vertex(Vertex beside) const {
+    const Vec3 vertex = hull_.vertices[beside[0].vertex];
+    return std::ranges::none_of(
+        beside, [&](const SharedPlanes::Beside& b) { return beyond(unit(hull_.vertices[b.other] - vertex), vertex); });
+  }
+
+  void begin_at_vertex(Vertex beside) {
+    const int v = beside[0].vertex;
     cutter_.begin();
-    cutter_.ball(wide(vertex), radius_);
+    cutter_.ball(wide(hull_.vertices[v]), radius_);
     for (const auto& [_, other, edge] : beside) {
       const SharedPlanes::Ends& ends = ends_of(edge);
       if (hull_.edges[edge].from == v) cutter_.cut_inside(ends.from);
       else cutter_.cut_outside(ends.to);
     }
-    cutter_.end();
+  }
+
+  /// The part of the mitred polytope over an edge or a vertex and outside the round lies beyond a plane. A direction
+  /// from the point to there is a sum of the facets' normals. If it is no shorter than the radius, it reaches at least
+  /// as far along `towards` as the least of these normals times the radius.
+  struct Mitre {
+    Vec3 point, towards;
+    double least;
+  };
+  static Mitre mitre_at(Vec3 point, std::span<const Vec3> normals) {
+    Vec3 sum;
+    for (const Vec3 n : normals) sum += n;
+    const Vec3 towards = unit(sum);
+    double least = 1;
+    for (const Vec3 n : normals) least = std::min(least, dot(towards, n));
+    return {point, towards, least};
+  }
+  bool reached(const Mitre& mitre) const {
+    return cutter_.heights({mitre.towards, dot(mitre.towards, mitre.point)}).second >= mitre.least * radius_;
+  }
+  void cut_beyond(const Mitre& mitre, double part) {
+    const WideVector inwards = wide(-mitre.towards);
+    cutter_.cut({inwards, dot(inwards, wide(mitre.point)) - DoubleDouble{part * mitre.least * radius_}});
   }
 
   bool near(std::span<const int> vertices) const {
@@ -433,7 +512,7 @@ bool RoundedHull::give_mitred(Cutter& cutter) const {
   const Vec3 far{kInfinity, kInfinity, kInfinity};
   RoundedCutter all(*this, cutter, {-far, far});
   if (!all.cut_mitred()) return false;
-  all.cut_edges_and_vertices();
+  all.cut_mitres();
   return true;
 }
 
