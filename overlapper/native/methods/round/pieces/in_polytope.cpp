@@ -24,11 +24,11 @@ double rounding_of(const EnclosingPolytope& polytope, double border) {
 }
 
 /// Negligible rounding, relative to the volume, for a piece with so many faces.
-double limit(size_t faces) { return sliceable(faces) ? kSure : kSureOfMany; }
+double limit(size_t faces, const PieceSetting& setting) { return sliceable(faces) ? setting.sure : kSureOfMany; }
 
-bool sure(const Totals& piece, size_t faces, const Totals& totals) {
+bool sure(const Totals& piece, size_t faces, const PieceSetting& setting, const Totals& totals) {
   const double volume = totals.volume + piece.volume;
-  return piece.error <= limit(faces) * volume && totals.error + piece.error <= kSureOfAll * volume;
+  return piece.error <= limit(faces, setting) * volume && totals.error + piece.error <= kSureOfAll * volume;
 }
 
 /// Sums over a polytope as tetrahedra between an apex and the triangles of its faces.
@@ -89,7 +89,7 @@ bool add_polytope(const EnclosingPolytope& polytope, const DistinctWalls& distin
     if (owner == 0) piece.pull += force, piece.moment += cross(first, face.normal);
   });
   piece.error = rounding_of(polytope, piece.border) + DBL_EPSILON * of_piece.cancelled;
-  if (!closed || !sure(piece, polytope.faces.size(), sums.totals)) return false;
+  if (!closed || !sure(piece, polytope.faces.size(), setting, sums.totals)) return false;
   sums.totals.add(piece);
   sums.patch = of_piece.patch;
   return true;
@@ -133,7 +133,8 @@ bool add_surface(const RoundPart& part, Totals& piece) {
 }
 
 /// Adds part of a round. `piece` has its volume, moments and error in the part's own coordinates.
-bool add_round_part(const RoundPart& part, const EnclosingPolytope& polytope, Totals& piece, Totals& totals) {
+bool add_round_part(const RoundPart& part, const EnclosingPolytope& polytope, const PieceSetting& setting,
+                    Totals& piece, Totals& totals) {
   const bool nothing = std::ranges::none_of(part.sections, [](const quadric::Section& s) { return s.area != 0; });
   if (!(piece.volume > 0)) return piece.volume == 0 && nothing;
   if (!add_surface(part, piece)) return false;
@@ -145,7 +146,7 @@ bool add_round_part(const RoundPart& part, const EnclosingPolytope& polytope, To
   const Vec3 s = totals.squares + piece.squares, first = totals.first + piece.first;
   const double about_mean = s.x + s.y + s.z - norm2(first) / (totals.volume + piece.volume);
   if (!(piece.error * norm2(mean) <= kSureOfMoments * about_mean)) return false;
-  if (!sure(piece, part.planes.size(), totals)) return false;
+  if (!sure(piece, part.planes.size(), setting, totals)) return false;
   totals.add(piece);
   return true;
 }
@@ -195,7 +196,7 @@ bool add_cylinder(const Round& cylinder, const EnclosingPolytope& polytope, cons
   static_cast<Moments&>(piece) = *found, piece.error = found->error;
   const RoundPart part{cylinder.owner, found->curved, found->whole_area, rings.planes(), owners, found->sections,
                        turn,           centre};
-  if (!add_round_part(part, polytope, piece, sums.totals)) return false;
+  if (!add_round_part(part, polytope, setting, piece, sums.totals)) return false;
   if (sums.patch) add_to_patch(part, setting.view, *sums.patch);
   return true;
 }
@@ -244,7 +245,8 @@ struct AboutBall {
 };
 
 /// True also if the common part is empty.
-bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const DistinctWalls& distinct, Sums& sums) {
+bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const DistinctWalls& distinct,
+              const PieceSetting& setting, Sums& sums) {
   if (sums.patch) return false;
   const Scratch<AboutBall> about;
   const Vec3 centre = rounded(ball.centre);
@@ -259,10 +261,10 @@ bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const Distin
   Totals piece;
   static_cast<Moments&>(piece) = *found, piece.error = found->error + nothing * found->area;
   // A wrong direction changes the area of a small ball before it changes the volume.
-  if (!(piece.error <= limit(faces) * ball.radius * (sums.totals.area + found->area))) return false;
+  if (!(piece.error <= limit(faces, setting) * ball.radius * (sums.totals.area + found->area))) return false;
   const RoundPart part{ball.owner,    {-found->flat, {}}, found->area, about->planes,
                        about->owners, found->sections,    {},          centre};
-  return add_round_part(part, polytope, piece, sums.totals);
+  return add_round_part(part, polytope, setting, piece, sums.totals);
 }
 
 }  // namespace
@@ -270,7 +272,7 @@ bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const Distin
 bool add_in_polytope(const Round* round, const EnclosingPolytope& polytope, const DistinctWalls& distinct,
                      const PieceSetting& setting, Sums& sums) {
   if (!round) return add_polytope(polytope, distinct, setting, sums);
-  if (round->ball) return add_ball(*round, polytope, distinct, sums);
+  if (round->ball) return add_ball(*round, polytope, distinct, setting, sums);
   return add_cylinder(*round, polytope, distinct, setting, sums);
 }
 

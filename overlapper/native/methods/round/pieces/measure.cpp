@@ -229,6 +229,8 @@ std::optional<RoundMeasures> measure_mitred(const SlicedPair& pair, const Enclos
   if (!both.become_mitred(pair, around)) return std::nullopt;
   PieceSetting setting = setting_of(pair);
   setting.common = &around;
+  // Other ways take much longer.
+  setting.sure = kMostOpen / 2;
   Sums sums{{}, pair.patch ? std::optional(*pair.patch) : std::nullopt};
   if (!pieces->mitred.add_all(both.a, both.b, around, setting, sums)) return std::nullopt;
   const Totals& totals = sums.totals;

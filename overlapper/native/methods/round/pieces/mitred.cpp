@@ -43,11 +43,13 @@ bool Mitred::add_all(const Pieces& a, const Pieces& b, const EnclosingPolytope& 
   common_ = loose_a_, loose_b_ = around;
   if (!cut_by(of_a, 0, common_) || !cut_by(of_a, 0, loose_b_)) return false;
   find_repeated(distinct_, setting, sums.totals.error);
-  // A mitred vertex reaches out of the box of its body. The box cuts off nothing of the body.
+  // A mitred vertex reaches out of the box of its body. The box cuts off nothing of the body, but it cuts rounds of the
+  // other body there.
   const int no_surface = static_cast<int>(walls_.size());
   walls_.push_back({{}, {}, slicing::kCut}), distinct_.walls.push_back(walls_.back());
-  for (EnclosingPolytope::Face& face : common_.faces)
-    if (face.wall == kNoWall) face.wall = no_surface;
+  for (EnclosingPolytope* polytope : {&common_, &loose_a_, &loose_b_})
+    for (EnclosingPolytope::Face& face : polytope->faces)
+      if (face.wall == kNoWall) face.wall = no_surface;
   if (!add_in_polytope(nullptr, common_, distinct_, setting, sums)) return false;
   more_ = less_ = sums, common_volume_ = sums.totals.volume;
   slots_a_ = slots_b_ = 0;

@@ -92,6 +92,9 @@ struct PatchView {
         owner(owner_) {}
 };
 
+/// Below this fraction of the volume, the rounding of a polytope's corners does not matter.
+inline constexpr double kSure = 5e-13;
+
 /// Settings for all pieces of a pair.
 struct PieceSetting {
   double extent = 0;                          ///< m: upper bound of the distance of common points from the inner point
@@ -99,12 +102,10 @@ struct PieceSetting {
   const EnclosingPolytope* common = nullptr;  ///< no piece lies outside of it
   PatchView view;                             ///< of the patch, if one is summed
   bool closely = false;                       ///< sample all of every interval
+  double sure = kSure;                        ///< negligible rounding of a polytope's corners, relative to the volume
   double layer = 0;                           ///< m: planes at most this far apart count as one
   double surface = 0;                         ///< m²: of the common set, if there are such layers
 };
-
-/// Below this fraction of the volume, the rounding of a polytope's corners does not matter.
-inline constexpr double kSure = 5e-13;
 
 /// Whether slices suit so many walls: their time grows with the cube of the number of walls.
 inline bool sliceable(size_t walls) { return walls <= 28; }
