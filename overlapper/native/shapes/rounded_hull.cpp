@@ -316,29 +316,31 @@ class RoundedCutter {
     if (beyond(cross(out_left, way), a) || beyond(cross(way, out_right), a)) return;
     if (inexact(edge.left) || inexact(edge.right)) charge_fold(dot(cross(out_left, out_right), way), norm(b - a));
     begin_at_edge(e);
-    // Seen from outside, the left facet is on the left of the edge, so its ring has the edge in this direction.
-    if (!cutter_.empty()) cutter_.cut_outside(side(edge.left, edge.from));
-    if (!cutter_.empty()) cutter_.cut_outside(side(edge.right, edge.to));
+    cut_beside(edge);
     cutter_.end();
   }
 
   /// Across the edge, the mitred polytope leaves the cylinder along two lines. Its part outside the cylinder lies
   /// beyond the plane through both lines.
   void cut_mitre(int e) {
-    // Up to this angle between the facets, that part is not worth a piece.
-    constexpr double kFlat = 1e-5;
+    // Up to this angle between the facets, that part is not worth a piece. Up to the other, the plane grazes the
+    // cylinder.
+    constexpr double kFlat = 1e-5, kGrazing = 0.01;
     const Edge& edge = hull_.edges[e];
     const Vec3 a = hull_.vertices[edge.from], b = hull_.vertices[edge.to];
     const std::array<Vec3, 2> normals{hull_.planes[edge.left].normal, hull_.planes[edge.right].normal};
     const Mitre mitre = mitre_at(a, normals);
     if (!reached(mitre) || !between_ends(e, unit(b - a))) return;
-    if (const double angle = norm(cross(normals[0], normals[1])); angle <= kFlat) {
+    const double angle = norm(cross(normals[0], normals[1]));
+    if (angle <= kFlat) {
       const double area = radius_ * angle * angle * angle / 12 * norm(b - a);
       cutter_.gap(radius_ * area, area);
       return;
     }
     begin_at_edge(e);
-    if (!cutter_.empty()) cut_beyond(mitre, 1);
+    const bool grazing = angle <= kGrazing && dot(normals[0], normals[1]) > 0;
+    if (!cutter_.empty()) cut_beyond(mitre, grazing ? kFartherIn : 1);
+    if (grazing) cut_beside(edge);
     cutter_.end();
   }
 
@@ -396,6 +398,12 @@ class RoundedCutter {
   bool beyond(Vec3 normal, Vec3 point) const { return cutter_.heights({normal, dot(normal, point)}).first > 0; }
   int through(const WideVector& normal, Vec3 point) { return cutter_.place({normal, dot(normal, wide(point))}); }
 
+  void cut_beside(const Edge& edge) {
+    // Seen from outside, the left facet is on the left of the edge, so its ring has the edge in this direction.
+    if (!cutter_.empty()) cutter_.cut_outside(side(edge.left, edge.from));
+    if (!cutter_.empty()) cutter_.cut_outside(side(edge.right, edge.to));
+  }
+
   /// The part of the ball between the ends of the edges at a vertex.
   void cut_vertex(Vertex beside) {
     if (!reaches_vertex(beside)) return;
@@ -404,8 +412,6 @@ class RoundedCutter {
   }
 
   void cut_mitred_vertex(Vertex beside) {
-    // A plane farther in leaves the points at which the polytope touches the ball off the plane.
-    constexpr double kFartherIn = 0.98;
     shared_->normals.clear();
     for (const auto& [_, other, edge] : beside)
       for (const int f : {hull_.edges[edge].left, hull_.edges[edge].right})
@@ -452,6 +458,8 @@ class RoundedCutter {
   bool reached(const Mitre& mitre) const {
     return cutter_.heights({mitre.towards, dot(mitre.towards, mitre.point)}).second >= mitre.least * radius_;
   }
+  /// A plane farther in does not touch the round where the polytope does.
+  static constexpr double kFartherIn = 0.98;
   void cut_beyond(const Mitre& mitre, double part) {
     const WideVector inwards = wide(-mitre.towards);
     cutter_.cut({inwards, dot(inwards, wide(mitre.point)) - DoubleDouble{part * mitre.least * radius_}});
