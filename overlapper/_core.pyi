@@ -491,29 +491,6 @@ class Placed:
 
     def __init__(self, shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
 
-    @staticmethod
-    def from_matrix(shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh, matrix: numpy.typing.ArrayLike) -> Placed:
-        """
-        A shape placed by a homogeneous matrix, as used by trimesh.
-
-        Parameters
-        ----------
-        shape : shape, (n, 3) array_like or trimesh.Trimesh
-            A shape without a pose, or points in m, which stand for their convex hull. Or a closed convex mesh in m.
-        matrix : (4, 4) array_like
-            A rotation, and a position in m.
-
-        Returns
-        -------
-        Placed
-            The placed shape.
-
-        Raises
-        ------
-        ValueError
-            If the matrix scales, shears or reflects by more than 1e-6, or if its last row is not (0, 0, 0, 1).
-        """
-
     @property
     def shape(self) -> Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid: ...
 

@@ -47,7 +47,7 @@ def test_every_function_takes_a_mesh_as_a_shape():
     assert distance(CUBE, away) == 0.25
     assert penetration_depth(CUBE, Placed(CUBE, (0.75, 0, 0))) == 0.25
     assert iou(CUBE, Box([0.5, 0.5, 0.5])) == pytest.approx(1)
-    assert Placed.from_matrix(CUBE, np.eye(4)).volume == 1
+    assert Placed(CUBE, np.eye(4)).volume == 1
     found = Batch([CUBE, BALL]).overlaps([[0, 0, 0], [0.5, 0, 0]], [[0, 0, 0, 1]] * 2)
     assert found.volume[0] == pytest.approx(BALL.volume / 2)
 

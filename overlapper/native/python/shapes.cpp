@@ -331,13 +331,6 @@ void define(nb::module_& m, const RoundedHull*) {
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
-std::pair<Vec3, Quaternion> to_pose(nb::handle matrix) {
-  const Doubles array = to_doubles(matrix, "matrix", "an array of numbers of shape (4, 4)");
-  if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4)
-    fail("matrix", "must be an array of numbers of shape (4, 4), not of shape " + shape_text(array));
-  return matrix_pose(std::span<const double, 16>(array.data(), 16), "matrix");
-}
-
 /// The pose of a position and an orientation, or of a matrix in the place of the position.
 std::pair<Vec3, Quaternion> to_pose(nb::handle position, nb::handle orientation) {
   const Quaternion q = to_quaternion(orientation);
@@ -388,32 +381,6 @@ Examples
                ", position: numpy.typing.ArrayLike = (0, 0, 0), "
                "orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None")
                   .c_str()));
-  placed.def_static(
-      "from_matrix",
-      [](nb::handle shape, nb::handle matrix) {
-        const auto [position, orientation] = to_pose(matrix);
-        return make_placed(to_shape(shape, "shape"), position, orientation);
-      },
-      "shape"_a.none(), "matrix"_a.none(),
-      nb::sig(("def from_matrix(shape: " + any_solid() + ", matrix: numpy.typing.ArrayLike) -> Placed").c_str()),
-      R"(A shape placed by a homogeneous matrix, as used by trimesh.
-
-Parameters
-----------
-shape : shape, (n, 3) array_like or trimesh.Trimesh
-    A shape without a pose, or points in m, which stand for their convex hull. Or a closed convex mesh in m.
-matrix : (4, 4) array_like
-    A rotation, and a position in m.
-
-Returns
--------
-Placed
-    The placed shape.
-
-Raises
-------
-ValueError
-    If the matrix scales, shears or reflects by more than 1e-6, or if its last row is not (0, 0, 0, 1).)");
   placed.def_prop_ro(
       "shape", [](const Placed& p) { return to_python(p.shape); },
       nb::sig(("def shape(self) -> " + any_shape()).c_str()));
