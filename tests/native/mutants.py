@@ -329,6 +329,7 @@ class NativeBench(Bench):
         switch = self.folder / "switch.h"
         write(switch, SWITCH.encode())
         settings = [f"-DPython_EXECUTABLE={sys.executable}", "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG"]
+        settings += ["-DCMAKE_UNITY_BUILD=OFF"]  # a mutant then costs one source
         settings += [f"-DCMAKE_CXX_FLAGS=-w -include {switch}"]
         run(["cmake", "-S", str(self.tree / NATIVE), "-B", str(self.build), *settings], self.tree)
         while wrong := self.not_compiling():

@@ -2,14 +2,10 @@
 
 #include <algorithm>
 
+#include "geometry/constants.h"
 #include "geometry/predicates.h"
 
 namespace overlapper {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
 
 NearPolytope::NearPolytope(const WideBody& body, const WideVector& about)
     : body_(body), about_(about), local_(ask(body.shape, [](const auto& s) { return s.core_corners(); })) {

@@ -1,7 +1,6 @@
 #include "distance/wide_parting.h"
 
 #include <algorithm>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <vector>
@@ -10,13 +9,12 @@
 #include "distance/penetration.h"
 #include "distance/wide_gap.h"
 #include "geometry/cancellation.h"
+#include "geometry/constants.h"
 #include "geometry/rounding.h"
 #include "geometry/thresholds.h"
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// If the sine between two directions is smaller than this, their product is taken in double-double.
 constexpr double kNearlyParallel = 0x1p-3;

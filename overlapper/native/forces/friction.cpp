@@ -30,14 +30,15 @@ struct Factor {
 };
 
 /// The points of a patch are those of Gauss and Legendre in a rectangle that has the area moments of the patch.
-constexpr std::array<double, 4> kNodes{-0.8611363115940526, -0.3399810435848563, 0.3399810435848563,
-                                       0.8611363115940526};
+constexpr std::array<double, 4> kGaussNodes{-0.8611363115940526, -0.3399810435848563, 0.3399810435848563,
+                                            0.8611363115940526};
 constexpr std::array<double, 4> kWeights{0.1739274225687269, 0.3260725774312731, 0.3260725774312731,
                                          0.1739274225687269};
 static_assert(
     [] {
       double sum = 0, square = 0;
-      for (size_t i = 0; i < kNodes.size(); ++i) sum += kWeights[i], square += kWeights[i] * kNodes[i] * kNodes[i];
+      for (size_t i = 0; i < kGaussNodes.size(); ++i)
+        sum += kWeights[i], square += kWeights[i] * kGaussNodes[i] * kGaussNodes[i];
       return sum > 1 - 1e-15 && sum < 1 + 1e-15 && 3 * square > 1 - 1e-15 && 3 * square < 1 + 1e-15;
     }(),
     "means over an interval from -1 to 1, whose mean square is 1 / 3");
@@ -79,9 +80,9 @@ void PatchFriction::spread(const PlaneArea& area) {
   const double turn = std::atan2(area.uv, half) / 2, c = std::cos(turn), s = std::sin(turn);
   const double a = std::sqrt(3 * (mean + split)), b = std::sqrt(3 * std::max(mean - split, 0.0));
   double reach = 0;
-  for (size_t i = 0; i < kNodes.size(); ++i)
-    for (size_t j = 0; j < kNodes.size(); ++j) {
-      const double x = a * kNodes[i], y = b * kNodes[j], share = kWeights[i] * kWeights[j];
+  for (size_t i = 0; i < kGaussNodes.size(); ++i)
+    for (size_t j = 0; j < kGaussNodes.size(); ++j) {
+      const double x = a * kGaussNodes[i], y = b * kGaussNodes[j], share = kWeights[i] * kWeights[j];
       points_.push_back({c * x - s * y, s * x + c * y, share});
       reach += share * std::hypot(area.u + points_.back().u, area.v + points_.back().v);
     }

@@ -1,11 +1,11 @@
 #include "methods/choose.h"
 
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
 
 #include "distance/gjk.h"
 #include "distance/wide_gap.h"
+#include "geometry/constants.h"
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
 #include "methods/half_spaces_alone.h"
@@ -17,8 +17,6 @@
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 template <class S>
 Traits traits(const S& shape) {

@@ -4,19 +4,17 @@
 #include <cfloat>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numeric>
 #include <unordered_map>
 
 #include "geometry/cancellation.h"
+#include "geometry/constants.h"
 #include "geometry/ridges.h"
 #include "methods/dual/wide_dual.h"
 #include "overlap/dual_tree.h"
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Error of a sum of products of coordinates, relative to the sum of their sizes; the same as for a region's volume.
 constexpr double kSums = 256 * DBL_EPSILON;

@@ -6,7 +6,7 @@ namespace {
 
 bool zero(Quaternion q) { return unturned(q) && q.w == 0; }
 
-Quaternion unit(Quaternion given) {
+Quaternion normalized(Quaternion given) {
   const bool known = finite(vector_part(given)) && std::isfinite(given.w);
   const Quaternion q = known ? in_range(given) : given;
   const double length = std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
@@ -19,7 +19,7 @@ nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handl
   for (nb::handle each : frames_given) {
     frames.push_back(to_frame(each));
     if (zero(frames.back().orientation)) fail("frames", "must not have the zero quaternion");
-    frames.back().orientation = unit(frames.back().orientation);
+    frames.back().orientation = normalized(frames.back().orientation);
   }
   const std::vector<std::int64_t> which = to_indices(which_given, "which");
   const Doubles local_positions = to_doubles(positions_given, "positions", "an array of shape (k, 3)");
@@ -71,7 +71,7 @@ std::pair<Vec3, Quaternion> matrix_pose(std::span<const double, 16> matrix, cons
   else if (largest == x.x) q = {1 + x.x - y.y - z.z, x.y + y.x, z.x + x.z, y.z - z.y};
   else if (largest == y.y) q = {x.y + y.x, 1 - x.x + y.y - z.z, y.z + z.y, z.x - x.z};
   else q = {z.x + x.z, y.z + z.y, 1 - x.x - y.y + z.z, x.y - y.x};
-  return {column(3), unit(q)};
+  return {column(3), normalized(q)};
 }
 
 void define_poses(nb::module_& m) {

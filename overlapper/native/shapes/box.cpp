@@ -1,8 +1,8 @@
 #include "shapes/box.h"
 
 #include <algorithm>
-#include <limits>
 
+#include "geometry/constants.h"
 #include "shapes/inscribed.h"
 #include "shapes/limits.h"
 #include "shapes/mesh.h"
@@ -13,8 +13,6 @@ namespace overlapper {
 using namespace tangents;
 
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 constexpr std::array<Edge, 12> box_edges() {
   std::array<Edge, 12> edges{};

@@ -2,17 +2,15 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <span>
 
 #include "geometry/cancellation.h"
+#include "geometry/constants.h"
 #include "geometry/fitted_axes.h"
 #include "shapes/hull_data.h"
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Corners of a part, without the first corner of its facet.
 constexpr int kMostCorners = 8;

@@ -1,8 +1,8 @@
 #include "shapes/half_space.h"
 
 #include <cfloat>
-#include <limits>
 
+#include "geometry/constants.h"
 #include "shapes/limits.h"
 #include "shapes/solid.h"
 #include "shapes/wide_body.h"
@@ -10,12 +10,6 @@
 namespace overlapper {
 
 using namespace tangents;
-
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
 
 HalfSpace HalfSpace::make(Vec3 normal, double offset) {
   require(finite(normal), "normal must be finite");

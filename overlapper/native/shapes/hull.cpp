@@ -1,9 +1,9 @@
 #include "shapes/hull.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "geometry/cancellation.h"
+#include "geometry/constants.h"
 #include "shapes/cutter.h"
 #include "shapes/mesh.h"
 #include "shapes/solid.h"
@@ -11,8 +11,6 @@
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// If facets contain their corners only up to rounding, the planes of at most so many triangles are faces instead.
 constexpr size_t kMostTriangles = 256;

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cfloat>
-#include <limits>
 #include <numeric>
 #include <string>
 
 #include "geometry/cancellation.h"
+#include "geometry/constants.h"
 #include "geometry/expanding_hull.h"
 #include "geometry/predicates.h"
 #include "geometry/sum_in_pairs.h"
@@ -15,8 +15,6 @@
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// An origin that can be subtracted exactly. Sterbenz' lemma holds for coordinates within a factor of two of the
 /// middle. On each axis, the middle is therefore used only if the points are farther from zero than from the middle.

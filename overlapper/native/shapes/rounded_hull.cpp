@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cfloat>
-#include <limits>
 #include <numbers>
 #include <stdexcept>
 
 #include "geometry/cancellation.h"
+#include "geometry/constants.h"
 #include "geometry/scratch.h"
 #include "shapes/cutter.h"
 #include "shapes/limits.h"
@@ -16,8 +16,6 @@
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Up to so many facets, a scan takes no longer than a tree.
 constexpr size_t kMostScanned = 64;

@@ -1,15 +1,9 @@
 #include "shapes/wide_triangles.h"
 
-#include <limits>
-
+#include "geometry/constants.h"
 #include "shapes/hull_data.h"
 
 namespace overlapper {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
 
 WideTriangles::WideTriangles(const HullData* hull) : hull_(hull) {
   if (!hull) return;

@@ -1,8 +1,8 @@
 #include "methods/clipping/clip.h"
 
 #include <algorithm>
-#include <limits>
 
+#include "geometry/constants.h"
 #include "geometry/rounding.h"
 #include "methods/clipping/sign_table.h"
 #include "shapes/canonical_order.h"
@@ -11,8 +11,6 @@
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Workspace : TableClipping {
   std::vector<int> apex;          ///< per facet: one of its vertices, or -1

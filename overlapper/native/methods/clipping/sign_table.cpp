@@ -2,21 +2,19 @@
 
 #include <bit>
 #include <cstring>
-#include <limits>
 #include <tuple>
 
+#include "geometry/constants.h"
 #include "shapes/planes_asked.h"
 
 namespace overlapper {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 /// Processes two or four planes at once, depending on the machine.
 template <class Lanes>
 constexpr int kLanes = sizeof(Lanes) / sizeof(double);
 template <class Lanes>
-inline void load(const double* p, Lanes& v) {
+inline void read(const double* p, Lanes& v) {
   std::memcpy(&v, p, sizeof v);
 }
 
@@ -58,8 +56,8 @@ struct EdgeSigns {
     decltype(Lanes{} > Lanes{}) hidden{};  // per lane: number of planes that it may be outside of
     for (int j = 0; j < stride; j += kLanes<Lanes>) {
       Lanes begin, end;
-      load(from + j, begin);
-      load(to + j, end);
+      read(from + j, begin);
+      read(to + j, end);
       hidden -= begin + crossing.at * (end - begin) >= -doubt;
     }
     auto planes = hidden[0];
@@ -150,10 +148,10 @@ Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
       const ptrdiff_t end = std::min(first + 64, planes);
       for (ptrdiff_t j = first; j < end; j += kLanes<Lanes>, bit <<= kLanes<Lanes>) {
         Lanes normal_x, normal_y, normal_z, height;
-        load(nx + j, normal_x);
-        load(ny + j, normal_y);
-        load(nz + j, normal_z);
-        load(offset + j, height);
+        read(nx + j, normal_x);
+        read(ny + j, normal_y);
+        read(nz + j, normal_z);
+        read(offset + j, height);
         const Lanes s = normal_x * x + normal_y * y + normal_z * z - height;
         store(signs + j, s);
         choose(farthest > s, farthest, s, farthest);

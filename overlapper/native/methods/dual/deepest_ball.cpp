@@ -1,17 +1,15 @@
 #include "methods/dual/deepest_ball.h"
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
 
 #include "geometry/cancellation.h"
+#include "geometry/constants.h"
 #include "geometry/rounding.h"
 #include "methods/dual/basis.h"
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The largest number that the planes were computed from.
 double magnitude(std::span<const OwnedPlane> planes, std::span<const double> reach) {

@@ -2,15 +2,13 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
+#include "geometry/constants.h"
 #include "methods/dual/basis.h"
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 WidePlane supporting(const WideBody& body, const WideVector& outward) {
   const WideVector normal = unit(outward);

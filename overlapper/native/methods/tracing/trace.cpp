@@ -4,6 +4,7 @@
 
 #include "distance/portal.h"
 #include "geometry/cancellation.h"
+#include "geometry/constants.h"
 #include "geometry/scratch.h"
 #include "methods/tracing/seam.h"
 #include "shapes/canonical_order.h"
@@ -13,8 +14,6 @@
 
 namespace overlapper {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The common polytope of two bodies under construction.
 class Tracing {

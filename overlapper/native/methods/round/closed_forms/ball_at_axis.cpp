@@ -1,17 +1,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
+#include "geometry/constants.h"
 #include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/closed_forms/revolved_part.h"
 #include "methods/round/quadric/segment.h"
 
 namespace overlapper::closed_forms {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// A node of the rule of Gauss and Legendre with 24 nodes for θ from 0 to π. Its mirror image is a node, too.
 struct Node {

@@ -1,15 +1,13 @@
 #include <algorithm>
-#include <limits>
 #include <span>
 #include <vector>
 
+#include "geometry/constants.h"
 #include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/closed_forms/revolved_part.h"
 
 namespace overlapper::closed_forms {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A ball, or the end of a capsule, where dot(outward, x − centre) >= 0. Every side of a ball is such an end.
 struct RoundEnd {

@@ -1,15 +1,13 @@
 #include <algorithm>
-#include <limits>
 #include <span>
 
+#include "geometry/constants.h"
 #include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/closed_forms/only_cut.h"
 #include "methods/round/closed_forms/revolved_part.h"
 
 namespace overlapper::closed_forms {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// An upper bound of dot(direction, x) over the part of `body` below the plane, about its centre. The search for the
 /// least bound ends once the bound is `enough`. By weak duality, reach(direction − λ normal) + λ offset is a bound for

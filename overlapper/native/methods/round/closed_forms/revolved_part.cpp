@@ -1,14 +1,12 @@
 #include "methods/round/closed_forms/revolved_part.h"
 
 #include <algorithm>
-#include <numbers>
 
+#include "geometry/constants.h"
 #include "methods/round/quadric/shallow_ball.h"
 
 namespace overlapper::closed_forms {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 RevolvedPart half_ball(double r) {
   const double volume = 2 * kPi / 3 * r * r * r;

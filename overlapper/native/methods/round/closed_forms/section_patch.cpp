@@ -1,13 +1,11 @@
 #include <algorithm>
-#include <numbers>
 
+#include "geometry/constants.h"
 #include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/closed_forms/revolved_part.h"
 
 namespace overlapper::closed_forms {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// Integrals over a section of a body of revolution: p along its line of symmetry, z across it.
 struct SymmetricSection {

@@ -1,14 +1,12 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "geometry/constants.h"
 #include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/closed_forms/revolved_part.h"
 
 namespace overlapper::closed_forms {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// A contact at sides is shallow up to this depth, relative to the smaller radius.
 constexpr double kShallowSides = 0.25;

@@ -1,15 +1,13 @@
 #include "methods/round/lenses/sums.h"
 
 #include <algorithm>
-#include <numbers>
 
+#include "geometry/constants.h"
 #include "methods/round/quadric/gauss.h"
 #include "methods/round/quadric/segment.h"
 
 namespace overlapper::lenses {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// An arc of a circle: half the angle that it takes, with sine and cosine, and the circle's radius.
 struct Arc {

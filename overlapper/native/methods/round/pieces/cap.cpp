@@ -1,11 +1,9 @@
-#include <numbers>
 
+#include "geometry/constants.h"
 #include "methods/round/pieces/piece.h"
 
 namespace overlapper::pieces {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// A cap, with integrals about its tip: along the normal n of its disc, which leads away from the tip, and across n.
 struct Cap {

@@ -1,16 +1,12 @@
 #include "methods/round/pieces/piece.h"
 
 #include <algorithm>
-#include <limits>
-#include <numbers>
 
+#include "geometry/constants.h"
 #include "methods/round/slicing/stack.h"
 
 namespace overlapper::pieces {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Planes at most this far from each other, relative to the extent, are in one slab.
 constexpr double kOneSlab = 1e-6;

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "geometry/cancellation.h"
+#include "geometry/constants.h"
 #include "geometry/rounding.h"
 #include "geometry/scratch.h"
 #include "methods/round/slicing/slice.h"
@@ -13,9 +14,7 @@ namespace {
 
 /// The number of planes, including those of the box, that cut the polytope around the common set. This polytope need
 /// not be tight, and each piece of a body is cut from it.
-constexpr size_t kMostFaces = 64;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr size_t kMostRegionFaces = 64;
 
 Mat3 rounded(const WideMatrix& m) { return {rounded(m.row0), rounded(m.row1), rounded(m.row2)}; }
 
@@ -193,7 +192,7 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
   }
   std::ranges::sort(planes, {}, &EnclosingPolytope::Face::slack);
   for (const EnclosingPolytope::Face& plane : planes) {
-    if (result.faces.size() >= kMostFaces) break;
+    if (result.faces.size() >= kMostRegionFaces) break;
     cancellation_point(result.corners.size());
     result.cut(plane);
   }

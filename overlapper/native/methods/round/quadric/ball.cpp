@@ -3,19 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <vector>
 
+#include "geometry/constants.h"
 #include "geometry/wide.h"
 
 namespace overlapper::quadric {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr DoubleDouble kWidePi{kPi, 1.2246467991473532e-16};
-constexpr double kUnit = 0x1p-53;  ///< of rounding
 /// Relative error of a length: 4 roundings for a unit vector, one for a difference, 3 for their product. Relative to
 /// the size of the numbers.
 constexpr double kPlacing = 8 * kUnit;

@@ -3,24 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <vector>
 
+#include "geometry/constants.h"
 #include "geometry/scratch.h"
 #include "methods/round/quadric/segment.h"
 
 namespace overlapper::quadric {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kUnit = 0x1p-53;        ///< unit of rounding
 constexpr int kMostRoundings = 16;       ///< in a term of a sum
-constexpr double kPlacing = 16 * kUnit;  ///< error of the points where edges leave the cylinder, over their reach
+constexpr double kLeaving = 16 * kUnit;  ///< error of the points where edges leave the cylinder, over their reach
 constexpr double kNearlyWhole = 1e-5;    ///< rad: a shorter arc may be the rest of a whole turn
 constexpr double kUpright = 1e-12;       ///< a normal with a smaller component along the axis has straight arcs
 constexpr double kGrazing = 1e-6;        ///< squared sine between the surface and a face that grazes it
 constexpr double kBeyond = 1e-12;        ///< margin of a plane that is out of reach, over the reach of numbers
-constexpr double kOpen = 1e-9;           ///< largest relative sum of terms that should sum to zero
+constexpr double kUnbalanced = 1e-9;     ///< largest relative sum of terms that should sum to zero
 
 /// Functions of an arc's half angle x, as in SegmentSeries. All are odd.
 struct Arc {
@@ -341,8 +339,8 @@ bool add_face(const AboutAxis& at, size_t f, std::vector<CylinderChord>& chords,
 /// Whether the sums are those of a closed surface: its arcs turn forward as much as back, and its faces look up as much
 /// as down. Seen along the axis, faces that look up cover at most the disc once, but for rounding.
 bool closes(const CylinderSums& sums, double radius) {
-  return std::abs(sums.turned) <= kOpen && std::abs(sums.part.curved.force.z) <= kOpen * sums.all_area &&
-         sums.upward <= (1 + kOpen) * kPi * radius * radius;
+  return std::abs(sums.turned) <= kUnbalanced && std::abs(sums.part.curved.force.z) <= kUnbalanced * sums.all_area &&
+         sums.upward <= (1 + kUnbalanced) * kPi * radius * radius;
 }
 
 /// Changes moments about a point to moments about the point `level` lower.
@@ -357,11 +355,11 @@ bool finish(const AboutAxis& at, CylinderSums& sums) {
   const double r = at.radius, curved = r * sums.levels;
   CylinderPart& part = sums.part;
   part.volume = (sums.cones + r * curved) / 3;
-  if (!(part.volume <= (1 + kOpen) * kPi * r * r * at.height)) return false;
+  if (!(part.volume <= (1 + kUnbalanced) * kPi * r * r * at.height)) return false;
   part.area += curved, part.whole_area = sums.all_area + curved;
   const double reach = std::sqrt(sums.far2) + r;
   part.error =
-      kUnit * (kMostRoundings + sums.terms) * sums.sizes / 3 + kPlacing * reach * (sums.all_area + std::abs(curved));
+      kUnit * (kMostRoundings + sums.terms) * sums.sizes / 3 + kLeaving * reach * (sums.all_area + std::abs(curved));
   const Vec3 of_curved{r * part.curved.force.x, r * part.curved.force.y, r * sums.squares / 2};
   part.first = 0.25 * (sums.height_moments + r * of_curved);
   const double v = part.volume, both = sums.radial / 4 + r * r * v / 2, rest = (r * r * v - both) / 2;
@@ -403,7 +401,7 @@ struct CylinderScratch {
 // by no more than the rounding. The direction of an arc is certain unless its ends nearly meet. All arcs together turn
 // forth as much as back, and faces look up as much as down. An arc in the wrong direction would violate both.
 //
-// Error. Every term has at most kMostRoundings roundings, and every sum adds one. Points are off by kPlacing times the
+// Error. Every term has at most kMostRoundings roundings, and every sum adds one. Points are off by kLeaving times the
 // reach of their numbers. The volume between the computed surface and the true one is at most that, times the area.
 std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius) {
   const Scratch<CylinderScratch> scratch;

@@ -2,19 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <vector>
 
+#include "geometry/constants.h"
 #include "methods/round/quadric/gauss.h"
 #include "methods/round/quadric/segment.h"
 
 namespace overlapper::quadric {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kUnit = 0x1p-53;  ///< of rounding
 /// Two ends: their distance over the sum of their distances from the apex. Below this, doubles give no direction.
 constexpr double kOneWay = 1e-7;
 /// Squared distance from the sphere, relative to the squared radius. Below this, doubles do not decide on which side of
