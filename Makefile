@@ -13,12 +13,14 @@ NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
 # Least coverage in percent: lines and branches of Python; lines of the core.
 LEAST_OF_PYTHON := 86
 LEAST_OF_CORE := 90
+# Tests that start a Ray cluster of several nodes, which takes a sixth of the time of all tests.
+CLUSTER := tests/sweep/test_ray_nodes.py
 # Coverage of the core: its object files, its tests, and tests that fail in a build with counters.
 COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_out_of_memory python/test_stub
 
-.PHONY: help run test wheel record docs coverage coverage-python coverage-core mutants fuzz locks pictures lint format hooks ci clean
+.PHONY: help run test test-cluster wheel record docs coverage coverage-python coverage-core mutants fuzz locks pictures lint format hooks ci clean
 
 help: ## this list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -26,9 +28,12 @@ help: ## this list
 run: $(VENV)/run ## build, run SCENE=franka_grasp, write out/franka_grasp.csv and .html
 	@$(VENV)/bin/overlapper run $(SCENE) --out out/$(SCENE).csv --html out/$(SCENE).html
 
-test: $(VENV)/dev ## build, pass all tests
-	@echo "All tests take about 13 minutes on 2 processors"
-	@$(PYTEST) --numprocesses=auto --dist=worksteal
+test: $(VENV)/dev ## build, pass all tests except those of a Ray cluster
+	@echo "These tests take about 11 minutes on 2 processors. Tests of a Ray cluster are another target: make test-cluster"
+	@$(PYTEST) --numprocesses=auto --dist=worksteal $(CLUSTER:%=--ignore=%)
+
+test-cluster: $(VENV)/dev ## build, pass the tests of a Ray cluster of several nodes on this machine
+	@$(PYTEST) $(CLUSTER)
 
 # For any Python that the package supports. auditwheel writes the required version of libc into the wheel's name.
 wheel: ## build a wheel for PYTHON=python3, to be installed without a compiler, to dist/
