@@ -1,6 +1,7 @@
-"""Cameras that show moving and overlapping bodies, from the side where most of the largest overlap is seen.
+"""Cameras that show moving and overlapping bodies, from the side where most of the main overlap is seen.
 
-Half-spaces, and bodies of one link that are far larger than all others, are grounds. No view is made to fit a ground.
+The main overlap is the largest of two moving bodies, as of a hand and what it holds. If there is none, it is the largest
+of a moving body, and else the largest of all. Half-spaces, and bodies of one link that are far larger than all others, are grounds. No view is made to fit a ground.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ BACK = np.array([0.60, -0.68, 0.42]) / np.linalg.norm([0.60, -0.68, 0.42])  # th
 TURNS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180])  # of BACK about z
 NOWHERE = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 STILL = 1e-3  # of the scene's size: smaller motions are ignored
+LARGEST = 8.0  # over the smaller of the two links that overlap: the size of the opening view, so that both are seen
 
 
 @dataclass(frozen=True)
@@ -48,26 +50,50 @@ class View:
         return float(1.15 * np.max(aside / slope + corners @ self.back))
 
 
+@dataclass(frozen=True)
+class _Met:
+    """The largest overlap of two bodies, and the shapes of all bodies but grounds at its moment."""
+
+    overlap: Overlap
+    moment: int
+    links: tuple[tuple[int, int], tuple[int, int]]  # body and link of each of the two
+    shapes: tuple[list[tuple[int, int, int]], Array]  # body, link and shape; the boxes (n, 2, 3) around them, m
+
+
 class Framing:
     """The views of all moments seen so far. The first moment defines which bodies are grounds, and the scene's size.
 
-    `center` and `size` are those of the box around all bodies but grounds, m. `largest` is the largest overlap so far.
-    `moment` is the number of its moment, counted from 0; -1 if there is no overlap.
+    `center` and `size` are those of the box around all bodies but grounds, m.
     """
 
     def __init__(self, bodies: DrawnBodies) -> None:
         self._ground_size = _ground_size(bodies)
         box = around([box for _, box in self._bounded(bodies)])
         self.center, self.size = box.mean(axis=0), float(np.linalg.norm(box[1] - box[0]))
-        self.largest: Overlap | None = None
-        self.moment = -1
         self._moments = 0
         self._first: dict[tuple[int, int, int], Array] = {}  # the boxes of shapes when they were first seen
-        self._then: list[tuple[int, Array]] = []  # bodies and their boxes at the moment of the largest overlap
-        self._taking_part: set[int] = set()  # bodies in an overlap at that moment
+        self._largest: dict[frozenset[int], _Met] = {}  # of each pair of bodies
         self._moved: set[int] = set()
         self._met: set[int] = set()
         self._shared: dict[tuple[int, ...], Array] = {}
+
+    @property
+    def main(self) -> Overlap | None:
+        """The main overlap so far."""
+        found = self._main()
+        return found and found.overlap
+
+    @property
+    def moment(self) -> int:
+        """The number of the moment of the main overlap, counted from 0; -1 if there is no overlap."""
+        found = self._main()
+        return found.moment if found else -1
+
+    def _main(self) -> _Met | None:
+        def rank(pair: frozenset[int]) -> tuple[int, float]:
+            return len(pair & self._moved), self._largest[pair].overlap.volume
+
+        return self._largest[max(self._largest, key=rank)] if self._largest else None
 
     def is_ground(self, placed: Placed) -> bool:
         """True for a half-space, and for a shape as large as a body that is a ground."""
@@ -85,31 +111,48 @@ class Framing:
         for key, box in bounded:
             if np.abs(box - self._first.setdefault(key, box)).max() > STILL * self.size:
                 self._moved.add(key[0])
-        largest = self.largest
-        overlapping = [contact for contact in contacts if contact.overlap]
-        for each in overlapping:
+        shapes = [key for key, _ in bounded], np.array([box for _, box in bounded]).reshape(-1, 2, 3)
+        for each in contacts:
+            if not each.overlap:
+                continue
             box = np.asarray(each.overlap.bounds)
             if _extent(box) >= self._ground_size:
                 continue  # both are grounds
             pair = key_of(each)
             self._met |= {each.bodyA, each.bodyB}
             self._shared[pair] = around([self._shared.get(pair, box), box])
-            if self.largest is None or each.overlap.volume > self.largest.volume:
-                self.largest, self.moment = each.overlap, self._moments
-        if self.largest is not largest:
-            self._then = [(key[0], box) for key, box in bounded]
-            self._taking_part = {body for each in overlapping for body in (each.bodyA, each.bodyB)}
+            both = frozenset((each.bodyA, each.bodyB))
+            if both not in self._largest or each.overlap.volume > self._largest[both].overlap.volume:
+                links = (each.bodyA, each.linkA), (each.bodyB, each.linkB)
+                self._largest[both] = _Met(each.overlap, self._moments, links, shapes)
         self._moments += 1
 
     def opening(self) -> View:
+        """The view of moving and overlapping bodies, near enough that the bodies of the main overlap are seen."""
+        framed, main = self._moving(), self._main()
+        if main:
+            keys, boxes = main.shapes
+            of_links = [[box for key, box in zip(keys, boxes) if key[:2] == link] for link in main.links]
+            sizes = [_extent(around(each)) for each in of_links if each]
+            half = LARGEST * min(sizes, default=np.inf) / (2 * np.sqrt(3))
+            low, high = np.asarray(main.overlap.centroid) + [[-half], [half]]
+            framed = [np.clip(box, low, high) for box in framed if (box[0] <= high).all() and (low <= box[1]).all()]
+        return View.of(framed, self.side())
+
+    def moving(self) -> View:
         """The view of all moving and overlapping bodies. If nothing moves, the view of the overlapping bodies."""
+        return View.of(self._moving(), self.side())
+
+    def _moving(self) -> list[Array]:
         if self._moved:
             boxes = [box for key, box in self._first.items() if key[0] in self._moved]
-            # Moving bodies in an overlap at the moment of the largest overlap are framed there, too.
-            boxes += [box for body, box in self._then if body in self._moved & self._taking_part]
+            # The moving bodies of the main overlap are framed at its moment, too.
+            if main := self._main():
+                there = {body for body, _ in main.links} & self._moved
+                boxes += [box for key, box in zip(*main.shapes) if key[0] in there]
         else:
             boxes = [box for key, box in self._first.items() if key[0] in self._met]
-        return View.of([*boxes, *self._shared.values()] or self._all(), self.side())
+        return [*boxes, *self._shared.values()] or self._all()
 
     def whole(self) -> View:
         """The view of all bodies except grounds."""
@@ -119,8 +162,9 @@ class Framing:
         return list(self._first.values()) or [NOWHERE]
 
     def side(self) -> Array:
-        """The direction to the side from which the largest overlap is seen best."""
-        return _side(self.largest, [box for _, box in self._then]) if self.largest else BACK
+        """The direction to the side from which the main overlap is seen best."""
+        main = self._main()
+        return _side(main.overlap, main.shapes[1]) if main else BACK
 
     def _bounded(self, bodies: DrawnBodies) -> list[tuple[tuple[int, int, int], Array]]:
         """The shapes of all bodies that are not grounds, and the boxes around them."""
@@ -168,12 +212,12 @@ def _extent(box: Array) -> float:
     return float(np.linalg.norm(box[1] - box[0]))
 
 
-def _side(overlap: Overlap, boxes: Sequence[Array]) -> Array:
+def _side(overlap: Overlap, boxes: Array) -> Array:
     """The direction from which most of the overlap's surface is seen, and few boxes are in front of it."""
     corners = overlap.vertices[triangles(overlap.facets)]
     areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     centroid = np.asarray(overlap.centroid)
-    lower, upper = (np.array([box[k] for box in boxes]) - centroid for k in (0, 1))
+    lower, upper = (boxes[:, k] - centroid for k in (0, 1))
     elsewhere = ((lower > 0) | (upper < 0)).any(axis=1)
     best: Array = BACK
     most = -1.0

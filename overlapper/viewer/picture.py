@@ -106,7 +106,7 @@ class _Camera:
     @classmethod
     def of(cls, framing: Framing, back: Array, near: Array | None) -> _Camera:
         """A camera that sees what the framing has, or the box `near` (2, 3)."""
-        view = View.of([near] if near is not None else framing.opening().framed, back)
+        view = View.of([near] if near is not None else framing.moving().framed, back)
         right = np.array([-back[1], back[0], 0.0]) / np.hypot(back[0], back[1])
         distance = view.distance(WIDTH / HEIGHT) if near is None else NEAR * float(np.linalg.norm(near[1] - near[0]))
         return cls(view.at, np.array([right, np.cross(back, right), back]), distance)

@@ -59,7 +59,7 @@ def test_bodies_that_are_grounds_of_each_other_alone_are_seen_from_somewhere():
     made = framing(Scene({0: Placed(HalfSpace([0, 0, 1], 0))}))
     assert_allclose(box_around(made.whole()), [(-1, -1, -1), (1, 1, 1)])
     made = framing(Scene({0: SLAB, 1: SLAB, 2: Placed(Sphere(0.5), (0, 0, 0.4))}))
-    assert made.largest.volume < 1  # not what the two slabs share
+    assert made.main.volume < 1  # not what the two slabs share
     assert_allclose(box_around(made.opening()), [(-0.5, -0.5, -0.1), (0.5, 0.5, 0.9)])
 
 
@@ -74,9 +74,26 @@ def test_moving_and_overlapping_bodies_are_framed_and_the_whole_scene_excludes_g
     assert_allclose(box_around(made.opening()), [(-0.1, -0.1, 0.19), (0.1, 0.1, 0.6)])
     assert_allclose(box_around(made.whole()), [(-3.1, -2, 0), (1, 2, 4)])
     # Where nothing moves, the bodies that share something.
-    assert_allclose(box_around(framing(at(0.29)).opening()), [(-1, -1, 0), (1, 1, 0.39)])
+    assert_allclose(box_around(framing(at(0.29)).moving()), [(-1, -1, 0), (1, 1, 0.39)])
+    assert_allclose(box_around(framing(at(0.29)).opening()), [(-0.8, -0.8, 0), (0.8, 0.8, 0.39)])  # nearer
     # Where nothing is shared either, all.
     assert_allclose(box_around(framing(at(0.5)).opening()), [(-3.1, -2, 0), (1, 2, 4)])
+
+
+def test_the_main_overlap_is_that_of_two_moving_bodies_and_both_are_large_in_the_opening_view():
+    def at(grip, drop):
+        """An arm of three links whose last holds a ball, which sinks into a still tray first."""
+        arm = {(0, link): Placed(Box([0.5, 0.1, 0.1]), (link + grip, 0, 0)) for link in range(-1, 2)}
+        ball, tray = Placed(Sphere(0.05), (1.545, 0, drop)), Placed(Box([2, 2, 0.1]), (1.5, 0, -0.2))
+        return Scene(arm | {1: ball, 2: tray})
+
+    made = framing(at(0, -0.05), at(-0.01, -0.1), at(0.001, 0), at(-0.001, 0))
+    volumes = [sorted(each.overlap.volume for each in at(*pose).contacts()) for pose in ((-0.01, -0.1), (0.001, 0))]
+    assert volumes[0][-1] > 10 * made.main.volume == 10 * volumes[1][-1] and made.moment == 2
+    opening, moving = (box_around(view) for view in (made.opening(), made.moving()))
+    assert np.linalg.norm(np.subtract(*moving)) > 3
+    assert np.linalg.norm(np.subtract(*opening)) <= 8.001 * np.linalg.norm([0.1, 0.1, 0.1])
+    assert (opening[0] < [1.5, -0.04, -0.04]).all() and (opening[1] > [1.59, 0.04, 0.04]).all()
 
 
 def test_an_overlap_behind_a_wall_is_seen_from_the_other_side():
