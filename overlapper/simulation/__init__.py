@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from overlapper.simulation.bullet.recorder import Recorder
     from overlapper.simulation.cautions import (
         NoDirectionWarning,
+        NoStepWarning,
         SelfCollisionWarning,
         SkippedShapeWarning,
         SubstepsWarning,
@@ -41,6 +42,7 @@ __all__ = [
     "LinkContact",
     "LinkContacts",
     "NoDirectionWarning",
+    "NoStepWarning",
     "Recorder",
     "Report",
     "SelfCollisionWarning",
@@ -65,6 +67,7 @@ __getattr__ = lazily(
         "settings": ("Concave", "Surface"),
         "cautions": (
             "NoDirectionWarning",
+            "NoStepWarning",
             "SelfCollisionWarning",
             "SkippedShapeWarning",
             "SubstepsWarning",

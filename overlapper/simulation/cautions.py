@@ -23,3 +23,7 @@ class UnsettledWarning(UserWarning):
 
 class SubstepsWarning(UserWarning):
     """The substeps are too few for the stiffness: contacts lose energy."""
+
+
+class NoStepWarning(UserWarning):
+    """No step was made within the `with` of a VolumetricContact, or it was not noticed."""

@@ -12,7 +12,7 @@ from contact_experiments import HALF, STEP, G, World, run
 from simulated import box, ground, jointed
 
 import overlapper
-from overlapper.simulation import Bodies, Recorder, SubstepsWarning, UnsettledWarning, VolumetricContact
+from overlapper.simulation import Bodies, NoStepWarning, Recorder, SubstepsWarning, UnsettledWarning, VolumetricContact
 from overlapper.simulation.forces import told
 
 
@@ -24,6 +24,39 @@ def world():
 
 def resting(world, **options):
     return world.box(*[HALF] * 3, position=[0, 0, HALF - G / 1e5], **options)
+
+
+# A block without a step
+
+
+def test_a_block_without_a_step_is_told_at_its_line(world):
+    resting(world)
+    contact = world.contact()
+    said = r"^VolumetricContact made no step within its `with`, so it has computed no forces$"
+    with pytest.warns(NoStepWarning, match=said) as caught, contact:
+        p.getNumBodies(world.client)
+    assert caught[0].filename == __file__
+    with contact:
+        contact.forces()  # a script that integrates by itself
+    with contact:
+        p.stepSimulation(world.client)
+    with pytest.raises(ZeroDivisionError), contact:
+        raise ZeroDivisionError
+
+
+def test_steps_by_a_name_that_was_imported_earlier_are_told(world):
+    step = p.stepSimulation
+    world.box(*[HALF] * 3, position=[0, 0, 1])
+    said = r"although bodies have moved: a step is not noticed if its function was imported by name before, as in `from"
+    with pytest.warns(NoStepWarning, match=said), world.contact():
+        step(world.client)
+
+
+def test_a_client_that_is_disconnected_within_the_block_has_made_no_step(client):
+    box(client)
+    said = "so it has computed no forces$"
+    with pytest.warns(NoStepWarning, match=said), VolumetricContact(Bodies(client)):
+        p.disconnect(client)
 
 
 # Arguments
@@ -501,7 +534,7 @@ def test_step_simulation_within_the_block_is_a_step(world, recorded):
 
 def test_pybullet_refuses_invalid_calls_of_step_simulation_within_the_block(world):
     resting(world)
-    with world.contact() as contact:
+    with pytest.warns(NoStepWarning), world.contact() as contact:
         for call in (lambda: p.stepSimulation(world.client, 1), lambda: p.stepSimulation(client=1)):
             with pytest.raises(TypeError, match="argument"):
                 call()

@@ -102,6 +102,8 @@ class VolumetricContact:
     of the same model have no contacts within the `with`, either. `data.xfrc_applied` keeps the forces of the script.
     After `step()`, `data` has the poses from before the last integration, as after mj_step.
 
+    A `with` block that ends without a step or `forces()` gives a NoStepWarning. It says if bodies have moved meanwhile.
+
     A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning. The other bodies continue.
 
     If a body lies wholly within another, or goes through a plate, its force has no direction. The body is pushed in its
@@ -135,6 +137,7 @@ class VolumetricContact:
         self._substeps = substeps
         self._mechanics = bodies.mechanics()
         self._inside = False
+        self._unasked: tuple[Array, Array] | None = None  # where the bodies were at the `with`, until a step or forces are asked for
         self._parts: list[tuple[float, Forces]] = []  # of a step, the parts that substeps are, and their forces
         self._told = Told(bodies)
         self._model()
@@ -146,14 +149,18 @@ class VolumetricContact:
         """How often the solver went through all pairs in the last substep."""
 
     def __enter__(self) -> VolumetricContact:
+        self.bodies.update()
+        self._unasked = self.bodies.positions.copy(), self.bodies.orientations.copy()
         self._rules = self.bodies.rules
         self._mechanics.enter(self.bodies.link_pairs(self._among), self._answer, self._step_instead)
         self._inside = True
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._inside = False
         self._mechanics.leave()
+        if kind is None and self._unasked:
+            self._told.of_no_step(*self._unasked)
 
     def step(self) -> None:
         """Advance the simulation by one of its time steps.
@@ -343,6 +350,7 @@ class VolumetricContact:
 
     def _refresh(self) -> None:
         """Read which bodies have come or gone, and the masses."""
+        self._unasked = None
         self.bodies.update()
         if self._masses.are_stale():
             self._model()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.cautions import (
     NoDirectionWarning,
+    NoStepWarning,
     SkippedShapeWarning,
     SubstepsWarning,
     UnsettledWarning,
@@ -83,6 +84,24 @@ class Told:
                 SkippedShapeWarning,
                 stacklevel=4 + self.further,
             )
+
+    def of_no_step(self, positions: Array, orientations: Array) -> None:
+        """Warn of a `with` block without a step, at whose beginning the shapes were at these places."""
+        try:
+            self._bodies.update()
+        except ValueError:
+            moved = False  # the simulation has ended
+        else:
+            now = self._bodies.positions, self._bodies.orientations
+            moved = not all(map(np.array_equal, now, (positions, orientations)))
+        if moved:
+            why = (
+                "although bodies have moved: a step is not noticed if its function was imported by name before, "
+                "as in `from pybullet import stepSimulation`"
+            )
+        else:
+            why = "so it has computed no forces"
+        warnings.warn(f"VolumetricContact made no step within its `with`, {why}", NoStepWarning, stacklevel=3)
 
     def _new(self, kind: type[Warning], contacts: Contacts, rows: NDArray[np.bool_]) -> Iterator[tuple[int, str, str]]:
         """Yield the rows whose pairs were not warned of yet, with the names of their links."""
