@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 import warnings
+from array import array
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from functools import partial
@@ -15,6 +16,8 @@ from mmap import mmap
 from pathlib import Path
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any, get_args
+
+from numpy.typing import NDArray
 
 from overlapper.reference import By, reference
 from overlapper.scenes.other_processes import OtherProcesses
@@ -28,6 +31,7 @@ from overlapper.simulation.settings import Asking, Concave, Method, Modelling, S
 from overlapper.tables.frame import Frame
 from overlapper.tables.outputs import Per, can_be_written, outputs
 from overlapper.tables.summary import Summary
+from overlapper.tables.table_chart import drawn
 from overlapper.tables.table_file import origin
 from overlapper.whole_number import whole
 
@@ -124,7 +128,8 @@ class Watch:
         name: str = "the simulation",
         engine: str | None = None,
     ) -> None:
-        of_engine = engine_of(engine or engine_that_has(physicsClientId))
+        engine = engine or engine_that_has(physicsClientId)
+        of_engine = engine_of(engine)
         if whole(every, "every") < 1:
             raise ValueError(f"every must be a number of steps from 1, not {every}")
         if not (isinstance(rate, (int, float)) and 0 < rate < math.inf):
@@ -150,9 +155,15 @@ class Watch:
         self._names = names
         self._met: set[int] = set()  # the bodies of all measured steps, if there are names
         self._check = reference(check)
+        if self._check and self._check.by == "mujoco" != engine:
+            raise ValueError(
+                f"check='mujoco' needs a simulation of MuJoCo, but {LIBRARIES.get(engine, engine)} runs this one"
+            )
         self._simulation = of_engine.running(physicsClientId, recorder)
         self._bodies: AnyBodies | None = None
         self._files = ExitStack()
+        self._growing: list[Path] = []
+        self._moments = array("q"), array("d")  # numbers and times of the measured steps
         self._take: Callable[[Frame[AnyBodies]], None] | None = None
         self._rhythm = 0, 0.0, 0.0  # steps and time at the last change of the time step, and the time step
         self._sampler: threading.Thread | None = None
@@ -235,18 +246,63 @@ class Watch:
                 self._take = self._begun(self._bodies)
             self._take(Frame(self.steps, self.time, self._bodies, contacts))
             self.measured += 1
+            if self.out:  # else nothing can be drawn, and memory should not grow with the steps
+                for each, value in zip(self._moments, (self.steps, self.time)):
+                    each.append(value)
 
     def _begun(self, bodies: AnyBodies) -> Callable[[Frame[AnyBodies]], None]:
         """The function that takes the frames. It creates the files."""
         watched = {"simulation": self.summary.scene, "every": self.every}
         settings = origin(bodies.engine) | watched | settings_of(self._asking) | bodies.settings
-        files = outputs(self.summary, settings, self.written, self.out, self.html, self._per, self._check)
+        files = outputs(
+            self.summary,
+            settings,
+            self.written,
+            self.out,
+            self.html,
+            self._per,
+            self._check,
+            growing=self._growing,
+        )
         return self._files.enter_context(files)
 
     @property
     def unnamed(self) -> dict[int, str]:
         """The names given to bodies that were in the simulation in no measured step."""
         return {body: name for body, name in (self._names or {}).items() if body not in self._met}
+
+    def plot(self, most: int = 8) -> NDArray[Any]:
+        """Draw the depth and volume of the pairs over time, as far as the simulation has come.
+
+        The chart is that of `Log.plot`. The rows are read from the table, so the watch needs `out`.
+
+        Parameters
+        ----------
+        most : int, default 8
+            The most pairs to draw: those with the largest volumes. The chart says if there are more.
+
+        Returns
+        -------
+        (2,) ndarray of matplotlib.axes.Axes
+            The panels of depth and volume.
+
+        Raises
+        ------
+        TypeError
+            If `most` is not a whole number.
+        ValueError
+            If the watch writes no table, nothing was measured yet, or `most` is less than 1.
+        OSError
+            If the table was moved or removed.
+        ImportError
+            Without matplotlib.
+        """
+        if not self.out:
+            raise ValueError("this watch writes no table to draw: name one, as in overlapper.watch(client, 'run.csv')")
+        if not self._growing:
+            raise ValueError("this watch has measured no step to draw")
+        path = self.out if self.out in self.written else self._growing[0]
+        return drawn(path, False, *self._moments, most)
 
     def close(self) -> None:
         """End the watch and put the files in their places. OSError if this fails.
@@ -372,7 +428,9 @@ class _Kept(Watch):
     def __init__(
         self, client: Any, number: Callable[[Watch], None], failed: list[tuple[Watch, Exception]], **how: Any
     ) -> None:
-        super().__init__(client, **how)
+        # The script must not get the error of a check of another simulator. The first measurement fails instead.
+        super().__init__(client, **{**how, "check": None})
+        self._check = reference(how["check"])
         self._number, self._failed = number, failed
 
     def _stepped(self) -> None:

@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any, Literal
 from numpy.typing import NDArray
 
 from overlapper.columns import Tabular
-from overlapper.plots import NEEDED, over_time
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.contacts import Contacts
 from overlapper.tables.outputs import StepTable
-from overlapper.tables.table import COLUMNS, FORCES
-from overlapper.tables.table_file import origin, read_table
+from overlapper.tables.table_chart import drawn
+from overlapper.tables.table_file import origin
 from overlapper.whole_number import whole
 
 if TYPE_CHECKING:
@@ -171,10 +170,7 @@ class Log:
         if not self.steps:
             raise ValueError("this Log has no steps to draw: add() writes one")
         path = self._table.growing if self._table else self._written
-        rows = read_table(path) if path else []
-        names = [name for name in (COLUMNS | FORCES if self._forces else COLUMNS) if name in NEEDED]
-        columns = {name: [row.get(name) for row in rows] for name in names}
-        return over_time(columns, *self._moments, most)
+        return drawn(path, self._forces, *self._moments, most)
 
     def close(self) -> None:
         """Put the finished table in its place."""

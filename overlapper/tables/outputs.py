@@ -118,11 +118,13 @@ def outputs(
     per: Per = "shape",
     check: Reference | None = None,
     forces: bool = False,
+    growing: list[Path] | None = None,
 ) -> Iterator[Callable[[Frame[Any]], None]]:
     """Give a function that takes frames, and writes them to the summary, the table `out` and the page `html`.
 
     Folders of `out` and `html` are made if they do not exist. The table has columns of `forces`, if frames have any.
-    `written` gets the files that exist in the end: in their place, or, if the run fails, beside it.
+    `written` gets the files that exist in the end: in their place, or, if the run fails, beside it. `growing` gets the
+    file that has the rows of the table until then.
     """
     for path in filter(None, (out, html)):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -132,6 +134,8 @@ def outputs(
         # The page is written last, and checked first.
         record = stack.enter_context(recorder(html, written)) if html else None
         table = stack.enter_context(_table(out, settings, per, forces, check, written)) if out else None
+        if table and growing is not None:
+            growing.append(table.growing)
 
         def take(frame: Frame[Any]) -> None:
             opinions = check.compare_contacts(frame.bodies, frame.contacts) if check else []

@@ -7,8 +7,12 @@ import sys
 import threading
 from pathlib import Path
 
+import numpy as np
+import pyarrow.parquet
 import pybullet as p
 import pytest
+from matplotlib import pyplot
+from numpy.testing import assert_allclose
 from simulated import box
 
 import overlapper
@@ -110,10 +114,35 @@ def test_only_an_error_keeps_the_table_from_its_place(pile, error, place):
 
 
 def test_mujoco_is_not_asked_about_a_simulation_of_pybullet(pile):
-    watch = overlapper.watch(pile, check="mujoco")
-    with pytest.raises(ValueError, match="check='mujoco' needs a simulation of MuJoCo, but another simulator runs"):
+    words = "^check='mujoco' needs a simulation of MuJoCo, but pybullet runs this one$"
+    with pytest.raises(ValueError, match=words):
+        overlapper.watch(pile, "own.csv", check="mujoco")
+    p.stepSimulation(pile)  # nobody watches
+    assert not [*Path().iterdir()]
+
+
+def test_a_watch_draws_the_rows_of_its_table_while_it_goes_on_and_after_its_end(pile):
+    pyplot.switch_backend("Agg")
+    with overlapper.watch(pile, "own.parquet", every=2) as watch:
+        with pytest.raises(ValueError, match=r"^this watch has measured no step to draw$"):
+            watch.plot()
+        for _ in range(4):
+            p.stepSimulation(pile)
+        meanwhile = [line.get_xydata() for line in watch.plot()[1].lines]
+    afterwards = [line.get_xydata() for line in watch.plot(most=1)[1].lines]
+    table = pyarrow.parquet.read_table("own.parquet").to_pydict()
+    assert {*table["step"]} == {2, 4} and len(meanwhile) == len({*zip(table["bodyA"], table["bodyB"])})
+    for times, _ in (line.T for line in meanwhile + afterwards):
+        assert_allclose(times, np.unique(table["time_s"]))
+    assert_allclose(afterwards[0], meanwhile[0])
+    pyplot.close("all")
+
+
+def test_a_watch_without_a_table_says_that_a_plot_needs_one(pile):
+    with overlapper.watch(pile) as watch:
         p.stepSimulation(pile)
-    assert not watch.open
+        with pytest.raises(ValueError, match=r"^this watch writes no table to draw: name one, as in overlapper\.watch"):
+            watch.plot()
 
 
 def test_a_missing_body_raises_in_the_call_of_the_step(pile):
