@@ -138,18 +138,19 @@ export QUIET_PYTEST
 $(VENV)/built: pyproject.toml $(NATIVE) | $(VENV)/bin/python
 	@echo "Building overlapper in $(VENV) (some minutes the first time, seconds after a change)"
 	@start=$$(date +%s); \
-	  $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable . && \
+	  $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-compile --editable . && \
 	  $(VENV)/bin/python -c "$$QUIET_PYTEST" && \
 	  echo "Built in $$(($$(date +%s) - start)) s"
 	@touch $@
 
-# Installs the dependencies of the package's extras. The package is already installed, so pip builds nothing.
+# Installs the dependencies of the package's extras. The package is already installed, so pip builds nothing. Python
+# compiles the modules to bytecode that are imported. With --no-compile, pip does not compile all others.
 $(VENV)/run: EXTRAS := sim,check,view,cli,frames
 $(VENV)/dev: EXTRAS := dev
 $(VENV)/run $(VENV)/dev: pyproject.toml | $(VENV)/built
 	@echo "Installing the packages of overlapper[$(EXTRAS)]"
 	@start=$$(date +%s); \
-	  $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check 'overlapper[$(EXTRAS)]' && \
+	  $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-compile 'overlapper[$(EXTRAS)]' && \
 	  echo "Installed in $$(($$(date +%s) - start)) s"
 	@touch $@
 
