@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Generator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from overlapper.install import hint, simulator_hint
 from overlapper.jobs.confined import MEGABYTES, SECONDS, Confined, Unanswered
 from overlapper.printable import first_line
-from overlapper.simulation.bullet.joints import ENDINGS, kinematic_tree
+from overlapper.simulation.bullet.joints import ENDINGS, TooManyLinks, kinematic_tree
 from overlapper.simulation.bullet.model_file import NotRead, read_apart
 from overlapper.simulation.bullet.model_text import root_of
 from overlapper.simulation.kinematic_tree import KinematicTree, Mimic
@@ -138,15 +138,23 @@ def read_robot(path: Path, modelling: Modelling = Modelling()) -> Robot:  # noqa
     """The robot of a URDF, SDF or MJCF file.
 
     MuJoCo's compiler reads MJCF if it is installed, else pybullet does. yourdfpy reads URDF if pybullet is not
-    installed. pybullet ignores mimic joints, so those of a URDF are read from its text. NotRead if the reader refuses
-    the file, or if pybullet reads something else than the file says. NotRead also if a joint mimics a joint that does
-    not exist, or mimics itself through others. ImportError if no library is installed that reads the file.
+    installed, or if the robot has more links than pybullet places. pybullet ignores mimic joints, so those of a URDF
+    are read from its text.
+
+    NotRead if the reader refuses the file, or if pybullet reads something else than the file says. NotRead also if a
+    joint mimics a joint that does not exist, or mimics itself through others. ImportError if no library is installed
+    that reads the file.
     """
     if path.suffix.lower() == ".xml" and find_spec("mujoco"):
         return _compiled(path, modelling)
     if path.suffix.lower() == ".urdf" and not find_spec("pybullet"):
         return _by_yourdfpy(path, modelling)
-    found: Robot = read_apart(path, _answers, (path, modelling), ENDINGS)
+    found: Robot | TooManyLinks = read_apart(path, _answers, (path, modelling), ENDINGS)
+    if isinstance(found, TooManyLinks):
+        if not find_spec("yourdfpy"):
+            raise NotRead(f"{path} cannot be read: {found}. More links need {hint('yourdfpy')}")
+        robot = _by_yourdfpy(path, modelling)
+        return replace(robot, notes=(*robot.notes, f"yourdfpy has read the file: {found}."))
     return found
 
 
@@ -191,7 +199,7 @@ def _by_yourdfpy(path: Path, modelling: Modelling) -> Robot:
 _reading = Confined(SECONDS, MEGABYTES)
 
 
-def _answers(request: tuple[Path, Modelling]) -> Generator[Robot | str, None, None]:
+def _answers(request: tuple[Path, Modelling]) -> Generator[Robot | TooManyLinks | str, None, None]:
     """Runs in the process in which pybullet reads the file: yields the robot, or why the file cannot be read."""
     path, modelling = request
     try:
@@ -203,6 +211,8 @@ def _answers(request: tuple[Path, Modelling]) -> Generator[Robot | str, None, No
             tied = root.find("equality/*") is not None
             notes = ("The <equality> of the file is not read: the joints that it couples move freely.",) if tied else ()
             yield Robot(tree.bodies[0], tree, {}, notes)
+    except TooManyLinks as error:
+        yield error
     except (NotRead, ValueError) as error:
         yield str(error)
 

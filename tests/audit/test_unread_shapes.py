@@ -9,7 +9,7 @@ import warnings
 
 import pybullet
 import pytest
-from robots import joint, limit, link, mimic, turntable, urdf
+from robots import joint, limit, link, mimic, turntable, urdf, without
 
 from overlapper.audit.assets import read_asset
 from overlapper.audit.audit import audit
@@ -217,9 +217,14 @@ def test_a_urdf_that_pybullet_would_misunderstand_is_refused_with_the_joint_or_l
     assert str(refused.value).startswith(sentence)
 
 
-def test_a_urdf_of_more_links_than_pybullet_places_is_refused(tmp_path):
-    path = urdf(tmp_path / "robot.urdf", *(link(f"l{k}") for k in range(132)))
-    assert refusal(path) == "it has 132 links, but pybullet returns the poses of at most 128"
+def test_a_urdf_of_more_links_than_pybullet_places_is_read_by_yourdfpy(tmp_path, monkeypatch):
+    joints = [joint(f"j{k}", "fixed", "l0", f"l{k}") for k in range(1, 132)]
+    path = urdf(tmp_path / "robot.urdf", *(link(f"l{k}") for k in range(132)), *joints)
+    robot = read_robot(path)
+    said = "it has 132 links, but pybullet returns the poses of at most 128"
+    assert len(robot.tree.links) == 132 and robot.notes == (f"yourdfpy has read the file: {said}.",)
+    monkeypatch.setattr("overlapper.audit.robot.find_spec", without("yourdfpy"))
+    assert refusal(path) == f"{said}. More links need yourdfpy: pip install yourdfpy"
 
 
 def test_a_fixed_joint_may_have_no_axis_and_a_long_line_may_break_between_elements(tmp_path):

@@ -33,6 +33,10 @@ KINDS: dict[int, Kind] = {
 }  # by pybullet's numbers of joint types
 
 
+class TooManyLinks(NotRead):
+    """A file has more links than pybullet returns the poses of."""
+
+
 def kinematic_tree(path: Path, root: Element, modelling: Modelling) -> Generator[str, None, KinematicTree]:
     """The links of a URDF, SDF or MJCF file whose text has this root. Yields LOADED when pybullet has loaded the file.
 
@@ -45,7 +49,7 @@ def kinematic_tree(path: Path, root: Element, modelling: Modelling) -> Generator
     from overlapper.simulation.bullet.recorder import Recorder
 
     if (count := len(root.findall("link"))) > MOST_LINKS:
-        raise NotRead(f"it has {count:,} links, but pybullet returns the poses of at most {MOST_LINKS}")
+        raise TooManyLinks(f"it has {count:,} links, but pybullet returns the poses of at most {MOST_LINKS}")
     must_be_sound(path, root)
     client = pybullet.connect(pybullet.DIRECT)
     with Recorder(client) as recorder:
