@@ -405,6 +405,18 @@ def test_ctrl_c_while_the_commands_are_imported_ends_without_a_traceback():
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "overlapper: interrupted\n")
 
 
+@pytest.mark.parametrize("library", ["typer", "rich"])
+def test_ctrl_c_while_a_library_of_the_command_line_is_imported_is_one_line(library, tmp_path):
+    (tmp_path / f"{library}.py").write_text("raise KeyboardInterrupt")
+    done = subprocess.run(
+        [sys.executable, "-m", "overlapper", "scenes"],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "overlapper: interrupted\n")
+
+
 @pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
 def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
     (tmp_path / "long.py").write_text(LONG)
