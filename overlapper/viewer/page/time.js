@@ -112,7 +112,7 @@ function follow() {
   const by = Object.keys(scales).find(each => wanted.has(each)) ?? "volume";
   leaveOut(by, +wanted.get(by));
   if (wanted.has("from")) look(...["from", "at"].map(name => onPage(wanted.get(name).split(",").map(Number))));
-  else lookAt("opening");
+  else lookAt(wanted.has("pair") ? "whole" : "opening");  // the pair may be far from the main overlap
   pauseAt(wanted.has("t") ? frameAt(+wanted.get("t")) : film.moment);
   choose(pairs.findIndex(pair => pair.join(",") === wanted.get("pair")));
 }
