@@ -247,8 +247,8 @@ class Watch:
             self._take(Frame(self.steps, self.time, self._bodies, contacts))
             self.measured += 1
             if self.out:  # else nothing can be drawn, and memory should not grow with the steps
-                for each, value in zip(self._moments, (self.steps, self.time)):
-                    each.append(value)
+                self._moments[0].append(self.steps)
+                self._moments[1].append(self.time)
 
     def _begun(self, bodies: AnyBodies) -> Callable[[Frame[AnyBodies]], None]:
         """The function that takes the frames. It creates the files."""

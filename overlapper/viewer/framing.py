@@ -1,7 +1,9 @@
 """Cameras that show moving and overlapping bodies, from the side where most of the main overlap is seen.
 
-The main overlap is the largest of two moving bodies, as of a hand and what it holds. If there is none, it is the largest
-of a moving body, and else the largest of all. Half-spaces, and bodies of one link that are far larger than all others, are grounds. No view is made to fit a ground.
+The main overlap is the largest of two moving bodies, as of a hand and what it holds. If there is none, it is the
+largest of a moving body, and else the largest of all.
+
+Half-spaces, and bodies of one link that are far larger than all others, are grounds. No view is made to fit a ground.
 """
 
 from __future__ import annotations
@@ -81,7 +83,7 @@ class Framing:
     def main(self) -> Overlap | None:
         """The main overlap so far."""
         found = self._main()
-        return found and found.overlap
+        return found.overlap if found else None
 
     @property
     def moment(self) -> int:

@@ -137,7 +137,8 @@ class VolumetricContact:
         self._substeps = substeps
         self._mechanics = bodies.mechanics()
         self._inside = False
-        self._unasked: tuple[Array, Array] | None = None  # where the bodies were at the `with`, until a step or forces are asked for
+        # Where the bodies were at the `with`, until a step or forces are asked for.
+        self._unasked: tuple[Array, Array] | None = None
         self._parts: list[tuple[float, Forces]] = []  # of a step, the parts that substeps are, and their forces
         self._told = Told(bodies)
         self._model()
