@@ -14,7 +14,7 @@ using namespace tangents;
 Capsule Capsule::make(double radius, double length) {
   require_size(radius, "radius");
   require(std::isfinite(length), "length must be finite");
-  require(length >= 0, "length must not be negative, it is " + std::to_string(length));
+  require(length >= 0, [&] { return "length must not be negative, it is " + std::to_string(length); });
   require(length < kLargest, "length must be less than 1e25 m");
   require_ratio(radius, length, "radius and length");
   return {radius, length};

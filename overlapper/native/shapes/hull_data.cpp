@@ -431,7 +431,8 @@ std::shared_ptr<HullData> hull_of_surface(Vec3 origin, std::span<const Vec3> cor
 }
 
 std::shared_ptr<HullData> hull_of_vertices(std::span<const Vec3> points) {
-  require(points.size() >= 4, "vertices must hold at least four points, not " + std::to_string(points.size()));
+  require(points.size() >= 4,
+          [&] { return "vertices must hold at least four points, not " + std::to_string(points.size()); });
   for (Vec3 p : points) require(finite(p), "vertices must be finite");
   Vec3 lower = points[0], upper = points[0];
   for (Vec3 p : points) lower = min(lower, p), upper = max(upper, p);

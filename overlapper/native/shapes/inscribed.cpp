@@ -20,7 +20,7 @@ void append_circle(double radius, double z, int n, std::vector<Vec3>& points) {
 int corners_of_circle(double tolerance, const char* shape) {
   // An inscribed n-gon lacks 2/3 (π/n)² of its disc.
   require(tolerance >= 1e-11,
-          std::string("tolerance must be 1e-11 or more where method 'paper' tessellates a ") + shape);
+          [&] { return std::string("tolerance must be 1e-11 or more where method 'paper' tessellates a ") + shape; });
   return std::max(8, static_cast<int>(std::ceil(std::numbers::pi * std::sqrt(2 / (3 * tolerance)))));
 }
 
