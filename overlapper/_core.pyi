@@ -688,6 +688,15 @@ class Overlap:
         """
 
     @property
+    def shape_gradient(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (m, 3) d volume / d (half extents) of each box, m². For a half-space, d volume / d (offset along its unit normal), then
+        zeros. It is the area of the common surface that lies on the sides across each axis. Where sides of two bodies lie in one
+        plane, the volume has two one-sided derivatives, and the area counts for either body. NaN for other shapes, and for a box
+        that overlaps a round shape; zeros unless overlapping.
+        """
+
+    @property
     def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """(n, 3) vertices of the common polytope, m; empty unless overlapping."""
 
@@ -1208,6 +1217,81 @@ def world_poses(frames: Sequence[Any], which: numpy.typing.NDArray[numpy.int64],
     `frames` begin with position and quaternion, as pybullet's answers do; thing i is fixed to frame `which[i]` at
     `positions[i]` and `orientations[i]` of it. Quaternions are of any length but 0; those in the world are as long as
     `orientations`. Of a frame that is not a number, neither are they.
+    """
+
+class ShapeArray:
+    """
+    Placed shapes of one kind, a row each. The functions of `overlapper.arrays` make them.
+    """
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, row: int) -> Placed: ...
+
+    def __repr__(self) -> str: ...
+
+    @property
+    def kind(self) -> str:
+        """
+        'boxes', 'rectangles', 'spheres', 'capsules', 'cylinders' or 'ellipsoids'.
+        """
+
+    @property
+    def volume(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(n,) m³ of each row; m² of rectangles."""
+
+    @property
+    def positions(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """(n, 3) positions of the centres, m."""
+
+    @property
+    def rotations(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, 3, 3) rotation matrices, from the coordinates of each shape to the world.
+        """
+
+    @property
+    def bounds(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(n, 2, 3) lower and upper corner of the bounding box of each row, m."""
+
+def boxes(sizes: numpy.typing.ArrayLike, positions: numpy.typing.ArrayLike | None = None, orientations: numpy.typing.ArrayLike | None = None) -> ShapeArray:
+    """Documented in overlapper.arrays."""
+
+def spheres(radii: numpy.typing.ArrayLike, positions: numpy.typing.ArrayLike | None = None) -> ShapeArray:
+    """Documented in overlapper.arrays."""
+
+def capsules(radii: numpy.typing.ArrayLike, lengths: numpy.typing.ArrayLike, positions: numpy.typing.ArrayLike | None = None, orientations: numpy.typing.ArrayLike | None = None) -> ShapeArray:
+    """Documented in overlapper.arrays."""
+
+def cylinders(radii: numpy.typing.ArrayLike, lengths: numpy.typing.ArrayLike, positions: numpy.typing.ArrayLike | None = None, orientations: numpy.typing.ArrayLike | None = None) -> ShapeArray:
+    """Documented in overlapper.arrays."""
+
+def ellipsoids(half_axes: numpy.typing.ArrayLike, positions: numpy.typing.ArrayLike | None = None, orientations: numpy.typing.ArrayLike | None = None) -> ShapeArray:
+    """Documented in overlapper.arrays."""
+
+def rectangles(rectangles: numpy.typing.ArrayLike, name: str) -> ShapeArray:
+    """Documented in overlapper.arrays."""
+
+def fit_boxes(corners: numpy.typing.ArrayLike, name: str) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.int32]]:
+    """
+    The boxes of (n, 8, 3) corners: (n, 3) sizes and (n, 3) positions in m, (n, 4) quaternions xyzw, and (n, 8) the index
+    of the given corner at each place of pytorch3d's order. `name` is the argument in messages.
+    """
+
+def common_volumes(a: ShapeArray, b: ShapeArray, aligned: bool, tolerance: float, threads: int | None) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Common volumes in m³: (n,) of row i of both, or (n, m) of every row of `a` with every row of `b`.
+    """
+
+def volumes_around(a: ShapeArray, b: ShapeArray, aligned: bool, threads: int | None) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Volumes in m³ of the convex hull of each pair of boxes, as `common_volumes` arranges them.
+    """
+
+def volume_gradients(a: ShapeArray, b: ShapeArray, weights: numpy.typing.ArrayLike, aligned: bool, tolerance: float, threads: int | None) -> tuple[tuple[numpy.typing.NDArray[numpy.float64], ...], tuple[numpy.typing.NDArray[numpy.float64], ...]]:
+    """
+    The derivatives of the weighted sum of common volumes, for the rows of `a` and of `b`: (n, 3) by the numbers of the
+    shape as in Overlap.shape_gradient, (n, 3) by the position, and (n, 3) by a rotation vector about the position.
     """
 
 class ContactSolver:

@@ -126,6 +126,8 @@ inline Quaternion to_quaternion(nb::handle value) {
 
 /// The pose of a homogeneous matrix, given by rows.
 std::pair<Vec3, Quaternion> matrix_pose(std::span<const double, 16> matrix, const std::string& name);
+/// The unit quaternion of a rotation.
+Quaternion rotation_quaternion(const Mat3& rotation);
 
 inline double to_double(nb::handle value, const std::string& name) {
   try {
@@ -189,6 +191,8 @@ std::string any_solid();
 Placed to_placed(nb::handle value, const std::string& name);
 /// "auto" or "paper".
 Method to_method(nb::handle value);
+/// A number of threads; None stands for one per processor.
+int to_threads(nb::handle given);
 /// A number as printed in a repr.
 std::string number(double value);
 
@@ -196,6 +200,7 @@ void define_shapes(nb::module_& m);
 void define_overlaps(nb::module_& m);
 void define_batch(nb::module_& m);
 void define_poses(nb::module_& m);
+void define_shape_arrays(nb::module_& m);
 void define_forces(nb::module_& m);
 void define_function(nb::module_& m);
 

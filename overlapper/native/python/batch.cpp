@@ -61,14 +61,6 @@ std::vector<IndexPair> to_pairs(nb::handle given, size_t k) {
   return pairs;
 }
 
-int to_threads(nb::handle given) {
-  if (given.is_none()) return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  int threads = 0;
-  if (!nb::try_cast<int>(given, threads)) throw nb::type_error("threads must be a whole number, or None");
-  if (threads < 1) fail("threads", "must be 1 or more, not " + std::to_string(threads));
-  return threads;
-}
-
 nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orientations, nb::handle pairs,
                           nb::handle tolerance_given, nb::handle threads_given, nb::handle method_name,
                           bool separated) {
@@ -401,6 +393,14 @@ Examples
 }
 
 }  // namespace
+
+int to_threads(nb::handle given) {
+  if (given.is_none()) return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  int threads = 0;
+  if (!nb::try_cast<int>(given, threads)) throw nb::type_error("threads must be a whole number, or None");
+  if (threads < 1) fail("threads", "must be 1 or more, not " + std::to_string(threads));
+  return threads;
+}
 
 void define_batch(nb::module_& m) {
   define_overlaps_class(m);

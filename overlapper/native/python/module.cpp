@@ -37,6 +37,7 @@ NB_MODULE(_core, m) {
   overlapper::python::define_overlaps(m);
   overlapper::python::define_batch(m);
   overlapper::python::define_poses(m);
+  overlapper::python::define_shape_arrays(m);
   overlapper::python::define_forces(m);
   overlapper::python::define_function(m);
 }

@@ -5,6 +5,7 @@
 #include "distance/penetration.h"
 #include "methods/half_spaces_alone.h"
 #include "overlap/overlap.h"
+#include "overlap/shape_gradient.h"
 #include "python/arrays.h"
 #include "shapes/canonical_order.h"
 
@@ -192,6 +193,18 @@ inertia and gradient were then computed again in double-double arithmetic, from 
       },
       R"((m, 6) d volume / d (translation, rotation vector about the body's own position) of each body, world axes: the area vector
 of the facets that the body owns, and its moment. m² and m³; zeros unless overlapping.)");
+}
+
+void define_shape_gradient(nb::class_<Overlap>& cls) {
+  array_property(
+      cls, "shape_gradient",
+      [](const Overlap& o) {
+        return to_numpy(std::span<const Vec3>(computed_of(o.bodies(), [&] { return shape_gradient(o); })));
+      },
+      R"((m, 3) d volume / d (half extents) of each box, m². For a half-space, d volume / d (offset along its unit normal), then
+zeros. It is the area of the common surface that lies on the sides across each axis. Where sides of two bodies lie in one
+plane, the volume has two one-sided derivatives, and the area counts for either body. NaN for other shapes, and for a box
+that overlaps a round shape; zeros unless overlapping.)");
 }
 
 /// The error bounds of an overlap.
@@ -399,6 +412,7 @@ so the status is 'touching'. 'paper': the method `paper`.)");
       R"(Error bound of each quantity, as `volume_error` is that of the volume. They take about as long as all
 quantities together.)");
   define_measures(cls);
+  define_shape_gradient(cls);
   define_boundary(cls);
   define_contact(cls);
   cls.def("__repr__", [](const Overlap& o) { return repr(o); });

@@ -48,6 +48,19 @@ nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handl
 
 }  // namespace
 
+Quaternion rotation_quaternion(const Mat3& rotation) {
+  const auto [x, y, z] = transposed(rotation);
+  // Four multiples of the quaternion are known. The multiple with the largest component loses no digits.
+  const double trace = x.x + y.y + z.z;
+  const double largest = std::max({trace, x.x, y.y, z.z});
+  Quaternion q;
+  if (largest == trace) q = {y.z - z.y, z.x - x.z, x.y - y.x, 1 + trace};
+  else if (largest == x.x) q = {1 + x.x - y.y - z.z, x.y + y.x, z.x + x.z, y.z - z.y};
+  else if (largest == y.y) q = {x.y + y.x, 1 - x.x + y.y - z.z, y.z + z.y, z.x - x.z};
+  else q = {z.x + x.z, y.z + z.y, 1 - x.x - y.y + z.z, x.y - y.x};
+  return unit(q);
+}
+
 std::pair<Vec3, Quaternion> matrix_pose(std::span<const double, 16> matrix, const std::string& name) {
   constexpr double kMostOff = 1e-6;
   if (!std::all_of(matrix.begin(), matrix.end(), [](double each) { return std::isfinite(each); }))
@@ -63,15 +76,7 @@ std::pair<Vec3, Quaternion> matrix_pose(std::span<const double, 16> matrix, cons
   const double cosine = std::max({std::abs(dot(x, y)), std::abs(dot(y, z)), std::abs(dot(z, x))});
   if (cosine > kMostOff)
     fail(name, "must have right angles between its axes: the cosine of an angle is " + number(cosine));
-  // Four multiples of the quaternion are known. The multiple with the largest component loses no digits.
-  const double trace = x.x + y.y + z.z;
-  const double largest = std::max({trace, x.x, y.y, z.z});
-  Quaternion q;
-  if (largest == trace) q = {y.z - z.y, z.x - x.z, x.y - y.x, 1 + trace};
-  else if (largest == x.x) q = {1 + x.x - y.y - z.z, x.y + y.x, z.x + x.z, y.z - z.y};
-  else if (largest == y.y) q = {x.y + y.x, 1 - x.x + y.y - z.z, y.z + z.y, z.x - x.z};
-  else q = {z.x + x.z, y.z + z.y, 1 - x.x - y.y + z.z, x.y - y.x};
-  return {column(3), normalized(q)};
+  return {column(3), rotation_quaternion(transposed(Mat3{x, y, z}))};
 }
 
 void define_poses(nb::module_& m) {

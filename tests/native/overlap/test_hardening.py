@@ -100,6 +100,15 @@ def answers(seed):
     found["RoundedHull"] = overlap(Placed(RoundedHull(points[0], 0.1)), Placed(Box([0.5, 0.5, 0.5])))
     frames = [(body.position, body.orientation) for body in (a, b, c)]
     found["world_poses"] = _core.world_poses(frames, np.arange(3), positions, orientations)
+    boxes = _core.boxes([[1, 1, 2]] * 3, positions, orientations)
+    round_shapes = [_core.spheres([0.5, 1], positions[:2]), _core.ellipsoids([[0.4, 0.5, 0.6]], positions[:1])]
+    round_shapes += [make([0.3], [0.6], positions[:1]) for make in (_core.capsules, _core.cylinders)]
+    common = _core.common_volumes
+    found["ShapeArray"] = [common(boxes, each, False, TOLERANCE, 2) for each in round_shapes]
+    rectangles = _core.rectangles([[0, 0, 1, 2, 0.3], [0.2, 0.1, 1, 1, 1]], "a")
+    found["rectangles"] = [_core.volumes_around(rectangles, rectangles, False, 2), rectangles.volume]
+    found["volume_gradients"] = _core.volume_gradients(boxes, boxes, np.ones(3), True, TOLERANCE, 2)
+    found["fit_boxes"] = _core.fit_boxes([[[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)]], "corners")
     found["random_polytope"] = Placed(random_polytope(9, rng=rng))
     return {name: bits(value) for name, value in found.items()}
 

@@ -289,6 +289,23 @@ bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_
   return true;
 }
 
+/// The areas of sides of the common polytope that was clipped last.
+SideAreas side_areas(Workspace& w, const Placed& first, const Placed& second) {
+  area_by_corners(w);
+  SideAreas areas{};
+  for (int f = 0; f < static_cast<int>(w.apex.size()); ++f) {
+    if (w.apex[f] < 0) continue;
+    const bool of_first = f < w.first.facets;
+    const Shape& shape = of_first ? first.shape : second.shape;
+    if (polytope_of(shape)) continue;
+    const int side = of_first ? f : f - w.first.facets;
+    const double area = std::sqrt(norm2(w.area_vector[f])) / 2;
+    Vec3& sum = areas[of_first ? 0 : 1];
+    (side < 2 ? sum.x : side < 4 ? sum.y : sum.z) += area;
+  }
+  return areas;
+}
+
 /// The bodies from the smallest to the largest. The order then does not depend on the caller's.
 std::vector<int> from_small_to_large(std::span<const Placed> bodies) {
   std::vector<int> order = canonical_order(bodies);
@@ -337,13 +354,17 @@ void add_pulls(const Workspace& w, const Pose& pose, Vec3 centroid, std::vector<
 
 }  // namespace
 
-std::optional<Measures> clip(const Placed& a, const Placed& b) {
+std::optional<Measures> clip(const Placed& a, const Placed& b, std::optional<SideAreas>* sides) {
   const bool swapped = !comes_first(a, b);
   std::optional<Measures> common(std::in_place);
   Pull on_first{};
   if (swapped ? clip_in_first(b, a, *common, on_first) : clip_in_first(a, b, *common, on_first))
     say_in_world(*common, on_first, a, b, swapped);
   else common.reset();
+  if (sides && common && common->measured) {
+    *sides = side_areas(workspace(), swapped ? b : a, swapped ? a : b);
+    if (swapped) std::swap((**sides)[0], (**sides)[1]);
+  }
   return common;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 
@@ -8,6 +9,10 @@
 #include "shapes/shape.h"
 
 namespace overlapper {
+
+/// m²: for each body of a pair, the area of its sides in the boundary of the common set. The sides of a box are summed
+/// across each axis. A half-space has one side, in x. The sides of a hull are not told apart: {0, 0, 0}.
+using SideAreas = std::array<Vec3, 2>;
 
 /// The common set of polytopes and half-spaces, by static filters: no value if a sign that it needs is uncertain. At
 /// least one body is bounded, none is round, and hulls are closed. Allocates nothing once its thread has seen bodies of
@@ -18,7 +23,9 @@ namespace overlapper {
 /// the other. The common polytope is known by its edges: whole and cut edges of either body, and a segment for each
 /// pair of facets that cross. That segment joins the two points that lie on both facets. Volume, moments and area
 /// vectors are sums over edges, in any order.
-std::optional<Measures> clip(const Placed& a, const Placed& b);
+///
+/// If the answer is measured, `sides` gets its areas unless it is null.
+std::optional<Measures> clip(const Placed& a, const Placed& b, std::optional<SideAreas>* sides = nullptr);
 
 /// The patch of a pair that clip() has measured, in world coordinates. For other pairs there may be no value.
 std::optional<Patch> clipped_patch(const Placed& a, const Placed& b);

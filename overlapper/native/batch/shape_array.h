@@ -1,0 +1,51 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "batch/box_tree.h"
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// Placed shapes of one kind, a row each.
+struct ShapeArray {
+  const char* kind = "";
+  std::vector<Placed> rows;
+  /// True for rectangles in the plane. They are boxes of height 1, so that volumes are areas.
+  bool planar = false;
+
+  size_t size() const { return rows.size(); }
+};
+
+/// m³: the bits of Overlap(a, b, tolerance).volume().
+double common_volume(const Placed& a, const Placed& b, double tolerance);
+
+/// m³: the volume of the convex hull of two boxes.
+double volume_around(const Placed& a, const Placed& b);
+
+/// The pairs of two arrays: row i of both, or every row of the first with every row of the second.
+enum class Pairing { kRows, kAll };
+
+/// A number for each pair.
+using PairValue = std::function<double(const Placed& a, const Placed& b)>;
+
+/// Calls `value` for each pair, and writes the answers to `values`: a row per pair for kRows, otherwise by rows of `a`.
+/// With `culled`, a pair whose boxes are disjoint gets 0 at once. The bits do not depend on `threads`. False if the
+/// caller cancels. Rectangles must not meet other shapes.
+bool for_pairs(const ShapeArray& a, const ShapeArray& b, Pairing pairing, bool culled, int threads,
+               const PairValue& value, std::span<double> values);
+
+/// The derivatives of a weighted sum of common volumes by the numbers of one row: of its shape, as shape_gradient(), of
+/// its position, and of a rotation vector about its position.
+struct RowGradient {
+  Vec3 shape, position, rotation;
+};
+
+/// Adds the derivatives of the weighted sum of the common volumes of pairs to the rows of both arrays. The weights are
+/// arranged as the values of for_pairs(). The bits do not depend on `threads`. False if the caller cancels.
+bool add_gradients(const ShapeArray& a, const ShapeArray& b, Pairing pairing, std::span<const double> weights,
+                   double tolerance, int threads, std::span<RowGradient> of_a, std::span<RowGradient> of_b);
+
+}  // namespace overlapper

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "geometry/measures.h"
+#include "overlap/overlap.h"
+
+namespace overlapper {
+
+/// The derivatives of the common volume by the numbers of each body's shape, in the order of its fields: the half
+/// extents of a box, or the offset of a half-space along its unit normal. NaN for other shapes.
+///
+/// If a surface moves along its normal at the speed v, the volume grows at the rate of the integral of v over the part
+/// of the surface that the body owns. The sides of a box across one axis move at the speed 1 if that half extent grows.
+/// The derivative is therefore the area of these sides in the boundary of the common set.
+std::vector<Vec3> shape_gradient(const Overlap& overlap);
+
+/// The volume of a pair and its derivatives.
+struct PairGradient {
+  double volume = 0;
+  std::array<std::array<double, 6>, 2> pose{};  ///< as Overlap::gradient()
+  std::array<Vec3, 2> shape{};                  ///< as shape_gradient()
+};
+/// Has the bits of an Overlap of both, and takes less time.
+PairGradient pair_gradient(const Placed& a, const Placed& b, double tolerance);
+
+}  // namespace overlapper

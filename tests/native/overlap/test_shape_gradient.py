@@ -1,0 +1,146 @@
+"""The derivative of the volume by sizes: against areas in rational arithmetic, and differences of exact volumes."""
+
+from fractions import Fraction
+
+import exact
+import numpy as np
+import pytest
+from families import make
+from numpy.testing import assert_allclose
+from strategies import quaternion
+
+from overlapper import Box, HalfSpace, Hull, Placed, Sphere, arrays, overlap, random_polytope
+
+PAIRS = [make("posed_boxes", seed) for seed in range(40)]
+
+
+def areas_of_sides(case, body):
+    """Exact but for the last rounding: area vectors are seen along the exact axes of the box."""
+    x, y, z, w = (Fraction(float(c)) for c in case.bodies[body].orientation)
+    axes = (
+        (w * w + x * x - y * y - z * z, 2 * (x * y + z * w), 2 * (x * z - y * w)),
+        (2 * (x * y - z * w), w * w - x * x + y * y - z * z, 2 * (y * z + x * w)),
+        (2 * (x * z + y * w), 2 * (y * z - x * w), w * w - x * x - y * y + z * z),
+    )
+    length = x * x + y * y + z * z + w * w
+    areas = [Fraction(0)] * 3
+    for facet in case.truth.facets:
+        if body in facet.owners:
+            along = [abs(exact.dot(exact.area_vector(facet), axis)) / length for axis in axes]
+            areas[along.index(max(along))] += max(along)
+    return areas
+
+
+@pytest.mark.parametrize("case", PAIRS, ids=repr)
+def test_half_extents_of_boxes_against_areas_in_rational_arithmetic(case):
+    found = overlap(*case.placed)
+    if case.truth.dimension < 3:
+        assert not found.shape_gradient.any()
+        return
+    for body in (0, 1):
+        exactly = np.array(areas_of_sides(case, body), float)
+        assert_allclose(found.shape_gradient[body], exactly, rtol=0, atol=1e-12 * case.truth.area)
+
+
+@pytest.mark.parametrize("case", [case for case in PAIRS if case.truth.dimension == 3][:8], ids=repr)
+def test_half_extents_of_boxes_against_differences_of_exact_volumes(case):
+    found = overlap(*case.placed)
+    step = 2.0**-20 * float(min(case.bodies[0].half_extents))
+    for axis in range(3):
+        volumes = []
+        for side in (-1, 1):
+            half = case.bodies[0].half_extents.copy()
+            half[axis] += side * step
+            moved = type(case)("moved", 0, (case.bodies[0]._replace(half_extents=half), case.bodies[1]))
+            volumes.append(moved.truth.volume)
+        slope = float((volumes[1] - volumes[0]) / Fraction(2 * step))
+        assert found.shape_gradient[0, axis] == pytest.approx(slope, abs=1e-5 * case.truth.area)
+
+
+def test_euler_holds_for_boxes_of_any_way():
+    # The volume has the degree 3 in all sizes and in the distance.
+    rng = np.random.default_rng(1)
+    for offset in (1.0, 1e-2, 1e-6, 1e-10):
+        for _ in range(10):
+            half, position, turn = rng.uniform(0.5, 1, 3), rng.uniform(-0.5, 0.5, 3), quaternion(rng)
+            near = half * np.exp(offset * rng.normal(size=3)), position + offset * rng.normal(size=3) * 0.2
+            a, b = Placed(Box(half), position, turn), Placed(Box(near[0]), near[1], turn + offset * rng.normal(size=4))
+            found = overlap(a, b)
+            sizes = found.shape_gradient[0] @ half + found.shape_gradient[1] @ near[0]
+            assert sizes + found.gradient[0, :3] @ (position - near[1]) == pytest.approx(3 * found.volume, rel=1e-9)
+
+
+def test_half_spaces_and_shapes_without_a_shape_gradient():
+    box, water = Placed(Box((1, 2, 3)), (0, 0, 0.5)), HalfSpace((0, 0, 1), 1.0)
+    assert_allclose(overlap(box, water).shape_gradient, [[2 * 4 * 3.5, 2 * 2 * 3.5, 8], [8, 0, 0]], rtol=1e-15)
+    assert overlap(Sphere(1.0), water).shape_gradient[1].tolist() == [0, 0, 0]
+    ball = overlap(Sphere(2.0), water).shape_gradient
+    assert ball[1] == pytest.approx([3 * np.pi, 0, 0]) and np.isnan(ball[0]).all()
+    hull = overlap(Hull(random_polytope(20, rng=1).vertices), Box((0.3, 0.3, 0.3))).shape_gradient
+    assert np.isnan(hull[0]).all() and np.isfinite(hull[1]).all()
+    assert np.isnan(overlap(Sphere(1.0), Box((1, 1, 1))).shape_gradient).all()
+    apart = overlap(Box((1, 1, 1)), Placed(Box((1, 1, 1)), (5, 0, 0)))
+    assert not apart.shape_gradient.any()
+
+
+def test_three_boxes():
+    boxes = [Box((1, 1, 1)), Placed(Box((1, 1, 1)), (0.5, 0.25, 0)), Placed(Box((2, 2, 0.5)), orientation=(1, 1, 1, 7))]
+    found, step = overlap(*boxes), 1e-6
+    for k, half in enumerate(([1, 1, 1], [1, 1, 1], [2, 2, 0.5])):
+        for axis in range(3):
+            volumes = []
+            for side in (-1, 1):
+                sizes = np.array(half, float)
+                sizes[axis] += side * step
+                body = boxes[k] if isinstance(boxes[k], Placed) else Placed(boxes[k])
+                moved = Placed(Box(sizes), body.position, body.orientation)
+                volumes.append(overlap(*boxes[:k], moved, *boxes[k + 1 :]).volume)
+            slope = (volumes[1] - volumes[0]) / (2 * step)
+            one_sided = k < 2 and axis == 2  # two boxes share the planes z = -1 and 1
+            assert one_sided or found.shape_gradient[k, axis] == pytest.approx(slope, abs=1e-7)
+
+
+@pytest.mark.parametrize("aligned", [True, False])
+def test_gradients_of_arrays_are_sums_of_those_of_overlaps(aligned):
+    rng = np.random.default_rng(6)
+    a, b = (
+        arrays.boxes(rng.uniform(0.5, 2, (9, 3)), rng.uniform(-1, 1, (9, 3)), rng.normal(size=(9, 4))) for _ in range(2)
+    )
+    weights = rng.normal(size=9 if aligned else (9, 9))
+    found = arrays.volume_gradient(a, b, weights, aligned=aligned)
+    assert all(
+        np.array_equal(one, two)
+        for row, other in zip(found, arrays.volume_gradient(a, b, weights, aligned=aligned, threads=3))
+        for one, two in zip(row, other)
+    )
+    sums = np.zeros((2, 9, 9))
+    for i in range(9):
+        for j in [i] if aligned else range(9):
+            each = overlap(a[i], b[j])
+            row = np.c_[each.shape_gradient / 2, each.gradient] * (weights[i] if aligned else weights[i, j])
+            sums[0, i] += row[0]
+            sums[1, j] += row[1]
+    for body in (0, 1):
+        assert_allclose(np.hstack(found[body]), sums[body], rtol=1e-12, atol=1e-12)
+
+
+def test_gradients_of_rectangles_against_differences():
+    rng = np.random.default_rng(7)
+    rows = np.c_[rng.uniform(-0.5, 0.5, (2, 20, 2)), rng.uniform(0.5, 2, (2, 20, 2)), rng.uniform(-3, 3, (2, 20, 1))]
+    of_a, of_b = arrays.volume_gradient(*rows, aligned=True)
+    for body, found in enumerate((of_a, of_b)):
+        assert found.sizes.shape == found.positions.shape == (20, 2) and found.rotations.shape == (20, 1)
+        for k, column in enumerate(np.hstack([found.positions, found.sizes, found.rotations]).T):
+            step = np.zeros_like(rows)
+            step[body, :, k] = 1e-6
+            slope = (arrays.volume(*(rows + step), aligned=True) - arrays.volume(*(rows - step), aligned=True)) / 2e-6
+            assert_allclose(column, slope, atol=1e-7)
+
+
+def test_round_shapes_have_no_gradient_by_arrays():
+    with pytest.raises(ValueError, match=r"^a must be boxes or rectangles$"):
+        arrays.volume_gradient(arrays.spheres([1]), arrays.boxes([[1, 1, 1]]), aligned=True)
+    with pytest.raises(
+        ValueError, match=r"^weights must be an array of numbers, one for each pair, not of shape \(2,\)"
+    ):
+        arrays.volume_gradient(arrays.boxes([[1, 1, 1]]), arrays.boxes([[1, 1, 1]]), [1, 2])
