@@ -20,7 +20,7 @@ COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_out_of_memory python/test_stub
 
-.PHONY: help run test test-cluster wheel record docs coverage coverage-python coverage-core mutants fuzz locks pictures lint format hooks ci clean
+.PHONY: help run test test-cluster test-torch wheel record docs coverage coverage-python coverage-core mutants fuzz locks pictures lint format hooks ci clean
 
 help: ## this list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -34,6 +34,9 @@ test: $(VENV)/dev ## build, pass all tests except those of a Ray cluster
 
 test-cluster: $(VENV)/dev ## build, pass the tests of a Ray cluster of several nodes on this machine
 	@$(PYTEST) $(CLUSTER)
+
+test-torch: build/torch/dev ## test overlapper.torch, in an environment of its own with torch (gigabytes)
+	@build/torch/bin/python -m pytest tests/with_torch
 
 # For any Python that the package supports. auditwheel writes the required version of libc into the wheel's name.
 wheel: ## build a wheel for PYTHON=python3, to be installed without a compiler, to dist/
@@ -169,6 +172,15 @@ build/coverage/dev build/sanitized/dev build/threads/dev: build/%/dev: $(VENV)/d
 	@$(COMPILER) SKBUILD_CMAKE_DEFINE="$(if $(SKBUILD_CMAKE_DEFINE),$(SKBUILD_CMAKE_DEFINE);)$(OPTION)" \
 	  SKBUILD_BUILD_DIR=build/$*/native build/$*/venv/bin/python -m pip install --quiet --disable-pip-version-check \
 	  --no-deps --editable .
+	@touch $@
+
+# An environment with torch, and with the packages of $(VENV) and this package by a .pth file.
+build/torch/dev: pyproject.toml | $(VENV)/dev
+	@echo "Installing torch in build/torch"
+	@$(VENV)/bin/python -m venv build/torch
+	@$(VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"), "import _editable_skbc_overlapper", sep="\n")' \
+	  >"$$(build/torch/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/others.pth"
+	@build/torch/bin/python -m pip install --quiet --disable-pip-version-check torch
 	@touch $@
 
 # Tries each Python on PATH, as the first may be a pyenv shim that does not run.

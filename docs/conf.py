@@ -30,6 +30,7 @@ myst_heading_anchors = 4
 autodoc_default_options = {"members": True, "undoc-members": True, "member-order": "bysource"}
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
+autodoc_mock_imports = ["torch"]  # gigabytes
 python_maximum_signature_line_length = 88
 toc_object_entries_show_parents = "hide"
 

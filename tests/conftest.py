@@ -1,5 +1,6 @@
 """Hypothesis draws the same examples on every run; `--hypothesis-profile=explore` looks further, with new ones."""
 
+import importlib.util
 import signal
 from pathlib import Path
 
@@ -19,6 +20,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 HERE = Path(__file__).parent
+
+# `make test-torch` runs these, in an environment of its own with torch.
+collect_ignore = [] if importlib.util.find_spec("torch") else ["with_torch"]
 
 
 def pytest_collection_modifyitems(items):

@@ -1,0 +1,117 @@
+"""Common volumes of boxes and their derivatives, for libraries that differentiate.
+
+Boxes are six arrays: sizes, positions and quaternions of `a`, then those of `b`. Arrays of more dimensions than rows
+need are stacks of calls.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import _core
+from overlapper.arrays import UNIT_CORNERS, ShapeArray
+
+Numbers = NDArray[np.float64]
+
+WIDTHS = (3, 3, 4)
+
+
+def volumes(six: Sequence[Any], aligned: bool, threads: int | None) -> Numbers:
+    """Common volumes: (..., n, m) of every row of `a` with every row of `b`, or (...,) of aligned rows."""
+    rows, stack, shape = _stacked(six, aligned)
+    found = [_core.common_volumes(*_both(each), aligned, 1e-3, threads) for each in zip(*rows)]
+    return np.reshape(found, stack + shape) if found else np.empty(stack + shape)
+
+
+def gradients(six: Sequence[Any], weights: Any, aligned: bool, threads: int | None) -> list[Numbers]:
+    """The derivatives of the weighted sum of the common volumes by each number of the six arrays."""
+    rows, stack, shape = _stacked(six, aligned)
+    count = math.prod(stack)
+    weights = np.reshape(np.asarray(weights, dtype=float), (1, count) if aligned else (count, *shape))
+    sums: list[list[Numbers]] = [[] for _ in six]
+    for each, by in zip(zip(*rows), weights):
+        for body, (shape_, position, rotation) in enumerate(
+            _core.volume_gradients(*_both(each), by, aligned, 1e-3, threads)
+        ):
+            quaternion = by_quaternion(each[3 * body + 2], rotation)
+            for k, found in enumerate((shape_ / 2, position, quaternion)):
+                sums[3 * body + k].append(found)
+    return [
+        np.reshape(found, np.shape(given)) if found else np.zeros(np.shape(given)) for found, given in zip(sums, six)
+    ]
+
+
+def check(six: Sequence[Any], aligned: bool) -> None:
+    """Raises ValueError unless the shapes of the arrays fit."""
+    for name, each, width in zip("aaabbb", six, WIDTHS * 2):
+        if each.ndim < (1 if aligned else 2) or each.shape[-1] != width:
+            raise ValueError(
+                f"{name} must be sizes (n, 3), positions (n, 3) and quaternions (n, 4), not an array of shape "
+                f"{tuple(each.shape)}"
+            )
+    for name, three in (("a", six[:3]), ("b", six[3:])):
+        if any(each.shape[:-1] != three[0].shape[:-1] for each in three):
+            raise ValueError(f"{name} must have as many positions and quaternions as sizes")
+    if aligned and six[0].shape[:-1] != six[3].shape[:-1]:
+        raise ValueError("a and b must have the same number of rows if they are aligned")
+
+
+def tangents(quaternions: Numbers) -> Numbers:
+    """(n, 3, 4) the derivatives of unit quaternions xyzw by a rotation vector in the world."""
+    x, y, z, w = np.moveaxis(quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True), -1, 0)
+    rows = [[w, -z, y, -x], [z, w, -x, -y], [-y, x, w, -z]]
+    return np.moveaxis(0.5 * np.array(rows), -1, 0)
+
+
+def by_quaternion(quaternions: Numbers, by_rotation: Numbers) -> Numbers:
+    """(n, 4) derivatives by quaternions of any length, from (n, 3) those by a rotation vector.
+
+    The length of a quaternion changes nothing, so the derivative is orthogonal to the quaternion. The three tangents of
+    a unit quaternion are orthogonal and have length 1/2.
+    """
+    length = np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    return np.asarray(4 * np.einsum("nkj,nk->nj", tangents(quaternions), by_rotation) / length)
+
+
+def corner_gradients(fitted: Sequence[Any], by_size: Numbers, by_position: Numbers, by_quaternion: Numbers) -> Numbers:
+    """(n, 8, 3) derivatives by the corners, from those by sizes, positions and unit quaternions of the fitted boxes.
+
+    A size is the length of the mean of four edges. A small change of the edges turns the nearest rotation by half of
+    the sum of the turns of the three axes.
+    """
+    sizes, _, quaternions, order = fitted
+    axes = np.swapaxes(_core.boxes(sizes, None, quaternions).rotations, 1, 2)  # a row for each axis
+    by_rotation = np.einsum("nkj,nj->nk", tangents(quaternions), by_quaternion)
+    by_edge = by_size[..., None] * axes + np.cross(by_rotation[:, None], axes) / (2 * sizes[..., None])
+    by_corner = by_position[:, None] / 8 + np.einsum("ck,nkj->ncj", UNIT_CORNERS / 2, by_edge)
+    found: Numbers = np.empty_like(by_corner)
+    np.put_along_axis(found, np.asarray(order)[..., None], by_corner, axis=1)
+    return found
+
+
+def _stacked(six: Sequence[Any], aligned: bool) -> tuple[list[Numbers], tuple[int, ...], tuple[int, ...]]:
+    """The arrays as stacks of rows, the shape of the stack, and the shape of an answer."""
+    check(six, aligned)
+    given = [np.asarray(each, dtype=float) for each in six]
+    if aligned:
+        stack = given[0].shape[:-1]
+        return [each.reshape(1, math.prod(stack), each.shape[-1]) for each in given], stack, ()
+    stack = given[0].shape[:-2]
+    rows = [each.reshape(math.prod(stack), *each.shape[-2:]) for each in given]
+    return rows, stack, (given[0].shape[-2], given[3].shape[-2])
+
+
+def _both(six: Sequence[Numbers]) -> tuple[ShapeArray, ShapeArray]:
+    return _named("a", six[:3]), _named("b", six[3:])
+
+
+def _named(name: str, three: Sequence[Numbers]) -> ShapeArray:
+    try:
+        return _core.boxes(*three)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None

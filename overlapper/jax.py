@@ -1,0 +1,146 @@
+"""Common volumes and IoU of oriented boxes as differentiable functions of JAX arrays, under `jit` and `vmap`.
+
+The numbers are computed on the processor in float64 by `jax.pure_callback`. Results have the dtype of the sizes of `a`.
+There are first derivatives in reverse mode only.
+"""
+
+from __future__ import annotations
+
+from functools import cache, partial
+from typing import Any, NamedTuple
+
+from overlapper import box_gradients
+from overlapper.install import hint
+
+try:
+    import jax
+    import jax.numpy as jnp
+except ImportError as error:
+    raise ImportError(f"overlapper.jax needs {hint('jax')}") from error
+
+__all__ = ["Boxes", "iou", "volume"]
+
+
+class Boxes(NamedTuple):
+    """Oriented boxes. A tree of arrays, as JAX transforms take it.
+
+    Parameters
+    ----------
+    sizes : (n, 3) jax.Array
+        Side lengths along x, y, z of each box, m.
+    positions : (n, 3) jax.Array
+        Centres, m.
+    orientations : (n, 4) jax.Array
+        Quaternions x, y, z, w of any length but 0.
+    """
+
+    sizes: jax.Array
+    positions: jax.Array
+    orientations: jax.Array
+
+
+def volume(a: Boxes, b: Boxes, *, aligned: bool = False, threads: int | None = 1) -> jax.Array:
+    """Common volumes of boxes.
+
+    Parameters
+    ----------
+    a, b : Boxes
+        Two sets of boxes. Aligned boxes may have any leading dimensions, or none.
+    aligned : bool, default False
+        True for row i of `a` with row i of `b`. False for every row of `a` with every row of `b`.
+    threads : int or None, default 1
+        Number of threads; None for one per processor.
+
+    Returns
+    -------
+    (n, m) or (n,) jax.Array
+        Volumes in m³. 0 for pairs that do not overlap; their derivatives are 0.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape, or a row is not finite or not positive. JAX may wrap the error about a row in a
+        JaxRuntimeError.
+
+    Examples
+    --------
+    >>> import jax, jax.numpy as jnp
+    >>> from overlapper.jax import Boxes, volume
+    >>> a = Boxes(jnp.full(3, 2.0), jnp.zeros(3), jnp.array([0, 0, 0, 1.0]))
+    >>> shared = lambda x: volume(a, a._replace(positions=jnp.array([x, 0, 0])), aligned=True)
+    >>> jax.value_and_grad(shared)(1.0)
+    (Array(4., dtype=float32), Array(-4., dtype=float32, weak_type=True))
+    """
+    found: jax.Array = _volume(tuple(a), tuple(b), aligned, threads)
+    return found
+
+
+def iou(a: Boxes, b: Boxes, *, aligned: bool = False, threads: int | None = 1) -> jax.Array:
+    """Intersection over union of boxes: the common volume over the volume of the union.
+
+    Parameters
+    ----------
+    a, b : Boxes
+        Two sets of boxes. Aligned boxes may have any leading dimensions, or none.
+    aligned : bool, default False
+        True for row i of `a` with row i of `b`. False for every row of `a` with every row of `b`.
+    threads : int or None, default 1
+        Number of threads; None for one per processor.
+
+    Returns
+    -------
+    (n, m) or (n,) jax.Array
+        Ratios from 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        As for `volume`.
+    """
+    shared = volume(a, b, aligned=aligned, threads=threads)
+    own, other = (jnp.prod(each.sizes, axis=-1) for each in (a, b))
+    ratio = shared / ((own if aligned else own[..., None]) + (other if aligned else other[..., None, :]) - shared)
+    # Rounding may lift the ratio above 1. The derivative stays.
+    return ratio - jax.lax.stop_gradient(jnp.maximum(ratio - 1, 0))
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(2, 3))
+def _volume(a: Any, b: Any, aligned: bool, threads: int | None) -> Any:
+    box_gradients.check([*a, *b], aligned)
+    shape = a[0].shape[:-1] if aligned else (a[0].shape[-2], b[0].shape[-2])
+    answer = jax.eval_shape(lambda: jnp.empty(shape, a[0].dtype))
+    return jax.pure_callback(_values(aligned, threads), answer, *a, *b, vmap_method="broadcast_all")
+
+
+def _forward(a: Any, b: Any, aligned: bool, threads: int | None) -> Any:
+    return _volume(a, b, aligned, threads), (a, b)
+
+
+def _backward(aligned: bool, threads: int | None, kept: Any, upstream: Any) -> Any:
+    six = [*kept[0], *kept[1]]
+    answer = jax.eval_shape(lambda: tuple(jnp.empty(each.shape, each.dtype) for each in six))
+    found = jax.pure_callback(_slopes(aligned, threads), answer, upstream, *six, vmap_method="broadcast_all")
+    return tuple(found[:3]), tuple(found[3:])
+
+
+_volume.defvjp(_forward, _backward)
+
+
+# JAX compiles a call anew for every new function, so the functions are kept.
+
+
+@cache
+def _values(aligned: bool, threads: int | None) -> Any:
+    def compute(*six: Any) -> Any:
+        return box_gradients.volumes(six, aligned, threads).astype(six[0].dtype)
+
+    return compute
+
+
+@cache
+def _slopes(aligned: bool, threads: int | None) -> Any:
+    def compute(weights: Any, *six: Any) -> Any:
+        found = box_gradients.gradients(six, weights, aligned, threads)
+        return tuple(each.astype(given.dtype) for each, given in zip(found, six))
+
+    return compute

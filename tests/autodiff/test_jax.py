@@ -1,0 +1,107 @@
+"""overlapper.jax: derivatives against differences, under jit and vmap."""
+
+import sys
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from box_pairs import general_boxes
+
+from overlapper import arrays
+from overlapper.jax import Boxes, iou, volume
+
+
+@pytest.fixture(autouse=True)
+def double_precision():
+    with jax.enable_x64(True):
+        yield
+
+
+def boxes(seed, n=6):
+    return Boxes(*map(jnp.asarray, general_boxes(np.random.default_rng(seed), n)))
+
+
+def slopes(function, *boxes):
+    """Central differences by every number."""
+    leaves, tree = jax.tree.flatten(boxes)
+    found = []
+    for k, leaf in enumerate(leaves):
+        by = np.zeros(leaf.shape)
+        for at in np.ndindex(leaf.shape):
+            step = np.zeros(leaf.shape)
+            step[at] = 1e-6
+            moved = [jax.tree.unflatten(tree, [*leaves[:k], leaf + s * step, *leaves[k + 1 :]]) for s in (1, -1)]
+            by[at] = (function(*moved[0]) - function(*moved[1])) / 2e-6
+        found.append(by)
+    return found
+
+
+@pytest.mark.parametrize("function", [volume, iou])
+@pytest.mark.parametrize("aligned", [True, False])
+def test_derivatives_against_differences(function, aligned):
+    a, b = boxes(1, 3), boxes(2, 3)
+    weights = np.random.default_rng(0).normal(size=3 if aligned else (3, 3))
+
+    def total(p, q):
+        return (weights * function(p, q, aligned=aligned)).sum()
+
+    for grad in (jax.grad(total, (0, 1)), jax.jit(jax.grad(total, (0, 1)))):
+        for found, slope in zip(jax.tree.leaves(grad(a, b)), slopes(total, a, b)):
+            np.testing.assert_allclose(found, slope, atol=1e-7)
+
+
+def test_values_are_those_of_arrays():
+    a, b = boxes(1), boxes(2, 4)
+    numbers = [arrays.boxes(*map(np.asarray, each)) for each in (a, b)]
+    assert np.array_equal(volume(a, b), arrays.volume(*numbers))
+    assert np.array_equal(jax.jit(volume)(a, b), arrays.volume(*numbers))
+    np.testing.assert_allclose(iou(a, b), arrays.iou(*numbers), rtol=1e-15)
+
+
+def test_vmap_over_rows_and_over_stacks():
+    a, b = boxes(1), boxes(2)
+    single = jax.vmap(lambda p, q: volume(p, q, aligned=True))
+    assert np.array_equal(single(a, b), volume(a, b, aligned=True))
+    every = jax.vmap(lambda p: jax.vmap(lambda q: volume(p, q, aligned=True))(b))(a)
+    assert np.array_equal(every, volume(a, b))
+    stacks = [
+        jax.tree.map(lambda *each: jnp.stack(each), *(boxes(seed) for seed in seeds)) for seeds in ((1, 2), (3, 4))
+    ]
+    both = jax.vmap(volume)(*stacks)
+    assert np.array_equal(both[0], volume(boxes(1), boxes(3))) and np.array_equal(both[1], volume(boxes(2), boxes(4)))
+    grad = jax.vmap(jax.grad(lambda p, q: volume(p, q).sum()))(*stacks)
+    alone = jax.grad(lambda p, q: volume(p, q).sum())(boxes(2), boxes(4))
+    for found, expected in zip(grad, alone):
+        assert np.array_equal(found[1], expected)
+
+
+def test_single_precision_stays_single_precision():
+    a, b = (jax.tree.map(lambda each: each.astype(jnp.float32), boxes(seed)) for seed in (1, 2))
+    value, slope = jax.value_and_grad(lambda p: iou(p, b, aligned=True).sum())(a)
+    assert value.dtype == slope.sizes.dtype == jnp.float32
+
+
+def test_no_iou_is_above_one():
+    a = boxes(7, 50)
+    ratio = iou(a, a, aligned=True)
+    assert (ratio <= 1).all() and (ratio > 1 - 1e-12).all()
+
+
+def test_refusals_name_the_argument():
+    a, b = boxes(1), boxes(2, 4)
+    with pytest.raises(ValueError, match="a and b must have the same number of rows if they are aligned"):
+        volume(a, b, aligned=True)
+    with pytest.raises(ValueError, match=r"^b must be sizes \(n, 3\)"):
+        volume(a, b._replace(orientations=b.orientations[:, :3]))
+    # JAX passes the error of a callback on, or wraps it.
+    with pytest.raises((ValueError, jax.errors.JaxRuntimeError), match=r"a: sizes\[0\] must be greater than 0"):
+        volume(a._replace(sizes=-a.sizes), b)
+
+
+@pytest.mark.parametrize("library", ["jax", "torch"])
+def test_a_missing_library_is_named(library, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    monkeypatch.delitem(sys.modules, f"overlapper.{library}", raising=False)
+    with pytest.raises(ImportError, match=f"^overlapper.{library} needs {library}: pip install {library}$"):
+        __import__(f"overlapper.{library}")

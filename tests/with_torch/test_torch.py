@@ -1,0 +1,135 @@
+"""overlapper.torch: gradcheck of all arguments, and the results of pytorch3d's function for its published cases.
+
+These tests need torch. They have a target of their own, `make test-torch`.
+"""
+
+import doctest
+
+import numpy as np
+import pytest
+import torch
+from box_pairs import general_boxes
+
+import overlapper.torch
+from overlapper import arrays
+from overlapper.torch import Boxes, box3d_overlap, boxes_of_corners, corners, iou, volume
+
+N = 12
+
+
+def boxes(seed, n=N, dtype=torch.float64):
+    numbers = general_boxes(np.random.default_rng(seed), n)
+    return Boxes(*(torch.tensor(each, dtype=dtype, requires_grad=True) for each in numbers))
+
+
+def checked(function, *tensors):
+    return torch.autograd.gradcheck(function, tensors, eps=1e-6, atol=1e-6, rtol=1e-5)
+
+
+@pytest.mark.parametrize("function", [volume, iou])
+@pytest.mark.parametrize("aligned", [True, False])
+def test_gradcheck_by_size_position_and_quaternion(function, aligned):
+    a, b = boxes(1), boxes(2, N if aligned else 5)
+    assert checked(lambda *six: function(Boxes(*six[:3]), Boxes(*six[3:]), aligned=aligned), *a, *b)
+
+
+def test_gradcheck_by_corners():
+    a, b = (corners(boxes(seed, 6)).detach() for seed in (3, 4))
+    rng = np.random.default_rng(0)
+    for order in (np.arange(8), rng.permutation(8)):
+        given = [each[:, order].clone().requires_grad_() for each in (a, b)]
+        assert checked(lambda *two: box3d_overlap(*two), *given)
+    flipped = a[:, [4, 5, 6, 7, 0, 1, 2, 3]].clone().requires_grad_()
+    assert checked(lambda each: box3d_overlap(each, b)[1], flipped)
+
+
+def test_gradcheck_of_the_fitted_box():
+    given = corners(boxes(5, 6)).detach().requires_grad_()
+    assert checked(lambda each: tuple(boxes_of_corners(each)), given)
+    made = boxes_of_corners(given)
+    assert torch.allclose(corners(made), given, atol=1e-14)
+
+
+def test_values_are_those_of_arrays():
+    a, b = boxes(1), boxes(2, 7)
+    numbers = [arrays.boxes(*(each.detach().numpy() for each in rows)) for rows in (a, b)]
+    assert volume(a, b).detach().numpy().tolist() == arrays.volume(*numbers).tolist()
+    assert volume(a, b, threads=None).equal(volume(a, b))
+    assert np.abs(iou(a, b).detach().numpy() - arrays.iou(*numbers)).max() < 1e-15
+    assert volume(a, a, aligned=True).equal(volume(a, a).diagonal())
+
+
+def test_single_precision_stays_single_precision():
+    a, b = boxes(1, dtype=torch.float32), boxes(2, dtype=torch.float32)
+    found = iou(a, b, aligned=True)
+    found.sum().backward()
+    assert found.dtype == a.sizes.grad.dtype == torch.float32
+    double = iou(*(Boxes(*(each.detach().double() for each in rows)) for rows in (a, b)), aligned=True)
+    assert torch.allclose(found.double(), double, rtol=1e-6)
+
+
+def test_the_signature_and_results_of_pytorch3d():
+    unit = torch.tensor([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]])
+    shifted = torch.stack([unit + torch.tensor([0.5, 0.5, 0]), unit, unit + 5])
+    vol, ratio = box3d_overlap(boxes1=unit[None], boxes2=shifted, eps=1e-4)
+    assert vol.shape == ratio.shape == (1, 3) and vol.dtype == torch.float32
+    assert torch.allclose(vol, torch.tensor([[0.25, 1, 0]])) and torch.allclose(ratio, torch.tensor([[1 / 7, 1, 0]]))
+    far = unit + torch.tensor([-24931.9805, 40325.3438, -254.5391])
+    assert box3d_overlap(far[None], far[None])[1].item() == pytest.approx(1, abs=1e-6)
+    assert box3d_overlap(unit[None], unit[None][:0])[0].shape == (1, 0)
+
+
+def test_no_iou_is_above_one_and_its_derivative_is_finite():
+    a = boxes(7, 50)
+    ratio = iou(a, Boxes(*(each.detach() for each in a)), aligned=True)
+    assert (ratio <= 1).all() and (ratio > 1 - 1e-12).all()
+    ratio.sum().backward()
+    assert all(each.grad.isfinite().all() for each in a)
+
+
+def test_boxes_that_are_apart_have_the_derivative_zero():
+    a, b = boxes(1), boxes(2)
+    volume(a, b._replace(positions=b.positions + 100)).sum().backward()
+    assert not any(each.grad.any() for each in a)
+
+
+def test_a_second_derivative_is_refused():
+    a, b = boxes(1), boxes(2)
+    given = corners(a).detach().requires_grad_()
+    for shared, leaf in ((volume(a, b), a.sizes), (box3d_overlap(given, corners(b).detach())[0], given)):
+        (slope,) = torch.autograd.grad(shared.sum(), leaf, create_graph=True)
+        with pytest.raises(NotImplementedError, match=r"^overlapper\.torch has first derivatives only$"):
+            slope.sum().backward()
+
+
+def test_boxes_are_fitted_to_boxes():
+    rng = np.random.default_rng(0)
+    target = Boxes(*(each.detach() for each in boxes(9, 16)))
+    noise = (0.15, 0.15, 0.1)
+    found = Boxes(*((t + s * torch.tensor(rng.normal(size=t.shape))).requires_grad_() for t, s in zip(target, noise)))
+    optimizer = torch.optim.Adam(found, 2e-2)
+    schedule = torch.optim.lr_scheduler.ExponentialLR(optimizer, 0.98)
+    losses = []
+    for _ in range(250):
+        optimizer.zero_grad()
+        loss = (1 - iou(found, target, aligned=True)).mean()
+        loss.backward()
+        optimizer.step()
+        schedule.step()
+        losses.append(loss.item())
+    assert losses[0] > 0.1 and losses[-1] < 0.02
+
+
+def test_refusals_name_the_argument():
+    a, b = boxes(1), boxes(2)
+    with pytest.raises(ValueError, match=r"^b: sizes\[0\] must be greater than 0"):
+        volume(a, b._replace(sizes=-b.sizes))
+    with pytest.raises(ValueError, match=r"^a must be sizes \(n, 3\)"):
+        volume(a._replace(sizes=a.sizes[:, :2]), b)
+    with pytest.raises(ValueError, match=r"^boxes2 must be an array of numbers of shape \(n, 8, 3\)"):
+        box3d_overlap(corners(a), corners(b)[:, :7])
+
+
+def test_examples():
+    found = doctest.testmod(overlapper.torch)
+    assert found.attempted > 5 and not found.failed
