@@ -691,9 +691,10 @@ class Overlap:
     def shape_gradient(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
         (m, 3) d volume / d (half extents) of each box, m². For a half-space, d volume / d (offset along its unit normal), then
-        zeros. It is the area of the common surface that lies on the sides across each axis. Where sides of two bodies lie in one
-        plane, the volume has two one-sided derivatives, and the area counts for either body. NaN for other shapes, and for a box
-        that overlaps a round shape; zeros unless overlapping.
+        zeros. For a sphere, a capsule or a rounded hull of a pair, d volume / d radius first. It is the area of the common surface
+        that lies on the sides across each axis, or on the round body. Where sides of two bodies lie in one plane, the volume has
+        two one-sided derivatives, and the area counts for either body. NaN for other numbers, and for a box that overlaps a round
+        body; zeros unless overlapping.
         """
 
     @property

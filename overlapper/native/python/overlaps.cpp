@@ -202,9 +202,10 @@ void define_shape_gradient(nb::class_<Overlap>& cls) {
         return to_numpy(std::span<const Vec3>(computed_of(o.bodies(), [&] { return shape_gradient(o); })));
       },
       R"((m, 3) d volume / d (half extents) of each box, m². For a half-space, d volume / d (offset along its unit normal), then
-zeros. It is the area of the common surface that lies on the sides across each axis. Where sides of two bodies lie in one
-plane, the volume has two one-sided derivatives, and the area counts for either body. NaN for other shapes, and for a box
-that overlaps a round shape; zeros unless overlapping.)");
+zeros. For a sphere, a capsule or a rounded hull of a pair, d volume / d radius first. It is the area of the common surface
+that lies on the sides across each axis, or on the round body. Where sides of two bodies lie in one plane, the volume has
+two one-sided derivatives, and the area counts for either body. NaN for other numbers, and for a box that overlaps a round
+body; zeros unless overlapping.)");
 }
 
 /// The error bounds of an overlap.

@@ -9,7 +9,19 @@ from families import make
 from numpy.testing import assert_allclose
 from strategies import quaternion
 
-from overlapper import Box, HalfSpace, Hull, Placed, Sphere, arrays, overlap, random_polytope
+from overlapper import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Hull,
+    Placed,
+    RoundedHull,
+    Sphere,
+    arrays,
+    overlap,
+    random_polytope,
+)
 
 PAIRS = [make("posed_boxes", seed) for seed in range(40)]
 
@@ -70,17 +82,44 @@ def test_euler_holds_for_boxes_of_any_way():
             assert sizes + found.gradient[0, :3] @ (position - near[1]) == pytest.approx(3 * found.volume, rel=1e-9)
 
 
-def test_half_spaces_and_shapes_without_a_shape_gradient():
+def test_half_spaces_and_numbers_without_a_derivative():
     box, water = Placed(Box((1, 2, 3)), (0, 0, 0.5)), HalfSpace((0, 0, 1), 1.0)
     assert_allclose(overlap(box, water).shape_gradient, [[2 * 4 * 3.5, 2 * 2 * 3.5, 8], [8, 0, 0]], rtol=1e-15)
-    assert overlap(Sphere(1.0), water).shape_gradient[1].tolist() == [0, 0, 0]
-    ball = overlap(Sphere(2.0), water).shape_gradient
-    assert ball[1] == pytest.approx([3 * np.pi, 0, 0]) and np.isnan(ball[0]).all()
     hull = overlap(Hull(random_polytope(20, rng=1).vertices), Box((0.3, 0.3, 0.3))).shape_gradient
     assert np.isnan(hull[0]).all() and np.isfinite(hull[1]).all()
-    assert np.isnan(overlap(Sphere(1.0), Box((1, 1, 1))).shape_gradient).all()
+    assert np.isnan(overlap(Sphere(1.0), Box((1, 1, 1))).shape_gradient[1]).all()
+    assert np.isnan(overlap(Cylinder(1.0, 1.0), Box((1, 1, 1))).shape_gradient).all()
+    assert np.isnan(overlap(Sphere(1.0), Sphere(1.0), Box((1, 1, 1))).shape_gradient).all()
     apart = overlap(Box((1, 1, 1)), Placed(Box((1, 1, 1)), (5, 0, 0)))
     assert not apart.shape_gradient.any()
+
+
+def test_radii_of_spheres_against_the_areas_of_caps():
+    # The radical plane of two spheres cuts off the caps; a cap of height h has the area 2 pi r h.
+    for r, s, d in ((1.0, 1.0, 1.5), (1.0, 0.5, 1.2), (1.0, 1e-3, 1.0), (1.0, 0.7, 1.7 - 1e-6)):
+        x = (d * d + r * r - s * s) / (2 * d)
+        found = overlap(Sphere(r), Placed(Sphere(s), (0, d, 0))).shape_gradient
+        caps = [2 * np.pi * r * (r - x), 2 * np.pi * s * (s - (d - x))]
+        assert_allclose(found, [[caps[0], 0, 0], [caps[1], 0, 0]], rtol=1e-8)
+    water = overlap(Sphere(2.0), HalfSpace((0, 0, 1), 1.0)).shape_gradient
+    assert_allclose(water, [[2 * np.pi * 2 * 3, 0, 0], [3 * np.pi, 0, 0]], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [Sphere, lambda r: Capsule(r, 0.8), lambda r: RoundedHull(random_polytope(8, rng=3).vertices * 0.4, r)],
+    ids=["sphere", "capsule", "rounded hull"],
+)
+@pytest.mark.parametrize(
+    "other",
+    [Box((0.5, 0.6, 0.7)), Sphere(0.8), Capsule(0.4, 0.5), Cylinder(0.5, 0.9), HalfSpace((1, 2, 3), 0.2)],
+    ids=lambda shape: type(shape).__name__,
+)
+def test_radii_against_differences_of_volumes(make, other):
+    body, step = Placed(other, (0.4, 0.3, -0.2), (0.3, -0.2, 0.5, 0.7)), 1e-4
+    found = overlap(make(0.5), body)
+    volumes = [overlap(make(0.5 + side * step), body, tolerance=1e-6).volume for side in (-1, 1)]
+    assert found.shape_gradient[0, 0] == pytest.approx((volumes[1] - volumes[0]) / (2 * step), rel=1e-6)
 
 
 def test_three_boxes():
