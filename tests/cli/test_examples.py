@@ -214,3 +214,8 @@ def test_two_feet_press_as_hard_as_what_stands_on_them(run, tmp_path):
     ((together,),) = numbers(r"together ([\d.]+) N", text)
     assert together == pytest.approx(90.02 * 9.81, rel=5e-3)
     assert (tmp_path / "foot_pressure.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_boxes_are_fitted_by_gradients(run):
+    ratios = [value for (value,) in numbers(r"mean IoU ([01]\.\d+)", run("fit_boxes.py"))]
+    assert ratios[0] < 0.6 and ratios[-1] > 0.999 and ratios == sorted(ratios)
