@@ -34,6 +34,9 @@ __all__ = [
 
 UNIT_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]) - 0.5
 
+# The numbers of a shape's size.
+SIZES = {"boxes": 3, "rectangles": 2, "spheres": 1, "capsules": 2, "cylinders": 2, "ellipsoids": 3}
+
 Shapes = ShapeArray | ArrayLike
 Numbers = NDArray[np.float64]
 
@@ -421,12 +424,13 @@ def diou(a: Shapes, b: Shapes, *, aligned: bool = False, tolerance: float = 1e-3
 
 
 class Gradient(NamedTuple):
-    """Derivatives by the numbers of boxes or rectangles, a row each.
+    """Derivatives by the numbers of shapes, a row each.
 
     Parameters
     ----------
-    sizes : (n, 3) ndarray
-        By the side lengths. (n, 2) for rectangles.
+    sizes : (n, k) ndarray
+        By the side lengths of boxes (k = 3) or rectangles (2), by the radius of spheres (1), or by the radius and the
+        length of capsules and cylinders (2). NaN where `Overlap.shape_gradient` is NaN, as for ellipsoids (3).
     positions : (n, 3) ndarray
         By the centres. (n, 2) for rectangles.
     rotations : (n, 3) ndarray
@@ -441,7 +445,7 @@ class Gradient(NamedTuple):
 def volume_gradient(
     a: Shapes, b: Shapes, weights: ArrayLike | None = None, *, aligned: bool = False, threads: int | None = 1
 ) -> tuple[Gradient, Gradient]:
-    """Derivatives of a weighted sum of common volumes of boxes or rectangles.
+    """Derivatives of a weighted sum of common volumes.
 
     Where sides of two boxes lie in one plane, the volume has two one-sided derivatives, and the result is one of both.
     Pairs that do not overlap have the derivative 0.
@@ -449,7 +453,7 @@ def volume_gradient(
     Parameters
     ----------
     a, b : ShapeArray, (n, 8, 3) array_like or (n, 5) array_like
-        Two arrays of boxes, or two of rectangles.
+        Two arrays of shapes, as `volume` takes them.
     weights : (n, m) or (n,) array_like, optional
         A factor for each common volume, as `volume` arranges them. 1 if left out.
     aligned : bool, default False
@@ -465,7 +469,7 @@ def volume_gradient(
     Raises
     ------
     ValueError
-        As for `volume`, if a shape is round, or if the weights do not fit.
+        As for `volume`, or if the weights do not fit.
 
     Examples
     --------
@@ -476,14 +480,18 @@ def volume_gradient(
     ([[4.0, 0.0, 0.0]], [[2.0, 2.0, 2.0]])
     """
     of_a, of_b = _shapes(a, "a"), _shapes(b, "b")
-    for rows, name in ((of_a, "a"), (of_b, "b")):
-        if rows.kind not in ("boxes", "rectangles"):
-            raise ValueError(f"{name} must be boxes or rectangles")
     if weights is None:
         weights = np.ones(len(of_a) if aligned else (len(of_a), len(of_b)))
     found = _core.volume_gradients(of_a, of_b, _array(weights), aligned, 1e-3, threads)
     plane, turn = (slice(2), slice(2, 3)) if of_a.kind == "rectangles" else (slice(3), slice(3))
-    one, other = (Gradient(by[0][:, plane] / 2, by[1][:, plane], by[2][:, turn]) for by in found)
+    one, other = (
+        Gradient(
+            by[0][:, : SIZES[rows.kind]] / (2 if rows.kind in ("boxes", "rectangles") else 1),
+            by[1][:, plane],
+            by[2][:, turn],
+        )
+        for rows, by in zip((of_a, of_b), found)
+    )
     return one, other
 
 

@@ -7,6 +7,7 @@
 #include "methods/choose.h"
 #include "methods/clipping/clip.h"
 #include "methods/round/round.h"
+#include "shapes/tangents.h"
 
 namespace overlapper {
 namespace {
@@ -41,33 +42,78 @@ std::vector<Vec3> areas_of_sides(const Boundary& boundary, std::span<const Place
   return areas;
 }
 
-/// The part of the common surface that each body of a pair owns, m², by slices. NaN if slices give up.
-std::array<double, 2> owned_areas(const Overlap& overlap) {
-  const Arrangement at = arranged(overlap.bodies());
-  const Vec3 inside = overlap.centroid() - at.reference;
-  const auto round = measure_by_slices({at.relative[0], at.relative[1], at.reference, wide(inside)});
-  std::array<double, 2> areas{kNaN, kNaN};
-  if (round) areas[at.order[0]] = round->first_area, areas[at.order[1]] = round->area - round->first_area;
-  return areas;
-}
+/// Slices of a pair that overlaps, with a part of its surface that counts.
+class SlicedSurface {
+ public:
+  explicit SlicedSurface(const Overlap& overlap)
+      : at_(arranged(overlap.bodies())), inside_(wide(overlap.centroid() - at_.reference)) {}
 
-/// True if the surface of the body moves out at the speed 1 as its radius grows.
-bool grows_by_radius(const Shape& shape) {
-  return std::holds_alternative<Sphere>(shape) || std::holds_alternative<Capsule>(shape) ||
-         std::holds_alternative<RoundedHull>(shape);
-}
+  /// m²: the part of the common surface that a body owns. NaN if slices give up.
+  double owned(int body) const {
+    if (!whole_) whole_ = measures({});
+    const auto& found = *whole_;
+    return !found ? kNaN : at_.order[0] == body ? found->first_area : found->area - found->first_area;
+  }
+  /// m²: the area of the faces of a body across its own axis k.
+  double faces(int body, int k) const {
+    const auto found = measures(counted(body, k));
+    return found ? found->first_area : kNaN;
+  }
+  /// m²: the area vector of the end of a capsule, along the axis that points to this end.
+  double end(int body) const {
+    const auto surface = counted(body, 2);
+    const auto found = measures(surface);
+    return found ? dot(found->pull.force, surface.axis) : kNaN;
+  }
+
+ private:
+  using Found = std::optional<pieces::RoundMeasures>;
+
+  pieces::CountedSurface counted(int body, int k) const {
+    const int place = at_.order[0] == body ? 0 : 1;
+    return {place, at_.relative[place].pose.rotation * tangents::axis(k)};
+  }
+  Found measures(std::optional<pieces::CountedSurface> surface) const {
+    return measure_by_slices({.a = at_.relative[0],
+                              .b = at_.relative[1],
+                              .reference = at_.reference,
+                              .inside = inside_,
+                              .counted = surface});
+  }
+
+  Arrangement at_;
+  WideVector inside_;
+  mutable std::optional<Found> whole_;
+};
 
 /// The derivatives by the numbers of shapes of a pair with a round body.
 std::vector<Vec3> gradient_of_round_pair(const Overlap& overlap) {
   const std::span<const Placed> bodies = overlap.bodies();
-  const bool by_radius = grows_by_radius(bodies[0].shape) || grows_by_radius(bodies[1].shape);
-  const std::array<double, 2> owned = by_radius ? owned_areas(overlap) : std::array{kNaN, kNaN};
+  // Stretched balls are not cut into pieces.
+  const bool pieces = !stretched(bodies[0].shape) && !stretched(bodies[1].shape);
+  const SlicedSurface surface(overlap);
   std::vector<Vec3> found;
   for (int i = 0; i < 2; ++i) {
     const Shape& shape = bodies[i].shape;
-    if (!bounded(shape)) found.push_back({norm(overlap.measures().pulls[i].force), 0, 0});
-    else if (!grows_by_radius(shape)) found.push_back({kNaN, kNaN, kNaN});
-    else found.push_back({owned[i], std::holds_alternative<Capsule>(shape) ? kNaN : 0, 0});
+    const auto faces = [&](int k) { return pieces ? surface.faces(i, k) : kNaN; };
+    const Vec3 force = overlap.measures().pulls[i].force;
+    if (!bounded(shape)) {
+      found.push_back({norm(force), 0, 0});
+    } else if (std::holds_alternative<Box>(shape)) {
+      found.push_back({faces(0), faces(1), faces(2)});
+    } else if (std::holds_alternative<Sphere>(shape) || std::holds_alternative<RoundedHull>(shape)) {
+      found.push_back({surface.owned(i), 0, 0});
+    } else if (std::holds_alternative<Capsule>(shape)) {
+      // Half of the length moves each end. The area vectors of both ends add up to the force along the axis.
+      const bool ball = std::get<Capsule>(shape).length == 0;
+      const double along = dot(bodies[i].pose.rotation * tangents::axis(2), force);
+      found.push_back({surface.owned(i), pieces && !ball ? surface.end(i) - along / 2 : kNaN, 0});
+    } else if (std::holds_alternative<Cylinder>(shape)) {
+      const double ends = faces(2);
+      found.push_back({surface.owned(i) - ends, ends / 2, 0});
+    } else {
+      found.push_back({kNaN, kNaN, kNaN});
+    }
   }
   return found;
 }

@@ -9,8 +9,9 @@
 namespace overlapper {
 
 /// The derivatives of the common volume by the numbers of each body's shape, in the order of its fields: the half
-/// extents of a box, the radius of a sphere, a capsule or a rounded hull, or the offset of a half-space along its unit
-/// normal. NaN for other numbers, for a box that overlaps a round body, and for round bodies in a group of three.
+/// extents of a box, the radius of a sphere or a rounded hull, the radius and the length of a capsule or a cylinder, or
+/// the offset of a half-space along its unit normal. NaN for ellipsoids and hulls, for flat faces and ends of bodies
+/// that overlap an ellipsoid, for the length 0, and for groups of three with a round body.
 ///
 /// If a surface moves along its normal at the speed v, the volume grows at the rate of the integral of v over the part
 /// of the surface that the body owns. The sides of a box across one axis move at the speed 1 if that half extent grows.

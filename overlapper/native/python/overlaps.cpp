@@ -202,10 +202,11 @@ void define_shape_gradient(nb::class_<Overlap>& cls) {
         return to_numpy(std::span<const Vec3>(computed_of(o.bodies(), [&] { return shape_gradient(o); })));
       },
       R"((m, 3) d volume / d (half extents) of each box, m². For a half-space, d volume / d (offset along its unit normal), then
-zeros. For a sphere, a capsule or a rounded hull of a pair, d volume / d radius first. It is the area of the common surface
-that lies on the sides across each axis, or on the round body. Where sides of two bodies lie in one plane, the volume has
-two one-sided derivatives, and the area counts for either body. NaN for other numbers, and for a box that overlaps a round
-body; zeros unless overlapping.)");
+zeros. For round bodies of a pair: d volume / d radius of a sphere or a rounded hull, then zeros; d volume / d (radius,
+length) of a capsule or a cylinder, then zero. It is the integral over the common surface of the speed at which the surface
+moves out. Where faces of two bodies lie in one plane, the volume has two one-sided derivatives, and the area counts for
+either body. NaN for hulls and ellipsoids, for boxes, cylinders and lengths of bodies that overlap an ellipsoid, for a
+length of 0, and for groups with a round body; zeros unless overlapping.)");
 }
 
 /// The error bounds of an overlap.

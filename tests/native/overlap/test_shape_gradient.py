@@ -13,6 +13,7 @@ from overlapper import (
     Box,
     Capsule,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Hull,
     Placed,
@@ -87,8 +88,6 @@ def test_half_spaces_and_numbers_without_a_derivative():
     assert_allclose(overlap(box, water).shape_gradient, [[2 * 4 * 3.5, 2 * 2 * 3.5, 8], [8, 0, 0]], rtol=1e-15)
     hull = overlap(Hull(random_polytope(20, rng=1).vertices), Box((0.3, 0.3, 0.3))).shape_gradient
     assert np.isnan(hull[0]).all() and np.isfinite(hull[1]).all()
-    assert np.isnan(overlap(Sphere(1.0), Box((1, 1, 1))).shape_gradient[1]).all()
-    assert np.isnan(overlap(Cylinder(1.0, 1.0), Box((1, 1, 1))).shape_gradient).all()
     assert np.isnan(overlap(Sphere(1.0), Sphere(1.0), Box((1, 1, 1))).shape_gradient).all()
     apart = overlap(Box((1, 1, 1)), Placed(Box((1, 1, 1)), (5, 0, 0)))
     assert not apart.shape_gradient.any()
@@ -105,21 +104,50 @@ def test_radii_of_spheres_against_the_areas_of_caps():
     assert_allclose(water, [[2 * np.pi * 2 * 3, 0, 0], [3 * np.pi, 0, 0]], rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "make",
-    [Sphere, lambda r: Capsule(r, 0.8), lambda r: RoundedHull(random_polytope(8, rng=3).vertices * 0.4, r)],
-    ids=["sphere", "capsule", "rounded hull"],
-)
-@pytest.mark.parametrize(
-    "other",
-    [Box((0.5, 0.6, 0.7)), Sphere(0.8), Capsule(0.4, 0.5), Cylinder(0.5, 0.9), HalfSpace((1, 2, 3), 0.2)],
-    ids=lambda shape: type(shape).__name__,
-)
-def test_radii_against_differences_of_volumes(make, other):
-    body, step = Placed(other, (0.4, 0.3, -0.2), (0.3, -0.2, 0.5, 0.7)), 1e-4
-    found = overlap(make(0.5), body)
-    volumes = [overlap(make(0.5 + side * step), body, tolerance=1e-6).volume for side in (-1, 1)]
-    assert found.shape_gradient[0, 0] == pytest.approx((volumes[1] - volumes[0]) / (2 * step), rel=1e-6)
+ROUND = {
+    "sphere": (Sphere, (0.5,)),
+    "capsule": (Capsule, (0.5, 0.8)),
+    "cylinder": (Cylinder, (0.5, 0.8)),
+    "box": (lambda *half: Box(half), (0.5, 0.4, 0.6)),
+    "rounded hull": (lambda r: RoundedHull(random_polytope(8, rng=3).vertices * 0.4, r), (0.3,)),
+}
+OTHERS = [Sphere(0.83), Capsule(0.4, 0.5), Cylinder(0.5, 0.9), Box((0.5, 0.6, 0.7)), HalfSpace((1, 2, 3), 0.2)]
+
+
+@pytest.mark.parametrize("kind", ROUND)
+@pytest.mark.parametrize("other", OTHERS, ids=lambda shape: type(shape).__name__)
+def test_numbers_of_round_pairs_against_differences_of_volumes(kind, other):
+    make, numbers = ROUND[kind]
+    body = Placed(other, (0.4, 0.3, -0.2), (0.3, -0.2, 0.5, 0.7))
+    found, step = overlap(make(*numbers), body).shape_gradient[0], 1e-4
+    for k in range(len(numbers)):
+        volumes = []
+        for side in (-1, 1):
+            moved = [n + side * step * (i == k) for i, n in enumerate(numbers)]
+            volumes.append(overlap(make(*moved), body, tolerance=1e-6).volume)
+        assert found[k] == pytest.approx((volumes[1] - volumes[0]) / (2 * step), rel=1e-5, abs=1e-7)
+    assert not found[len(numbers) :].any()
+
+
+@pytest.mark.parametrize("kind", ["sphere", "capsule", "cylinder", "box"])
+def test_euler_holds_for_round_pairs(kind):
+    # The volume has the degree 3 in all sizes and in the distance.
+    rng = np.random.default_rng(3)
+    make, numbers = ROUND[kind]
+    for other, sizes in ((Sphere, (0.8,)), (Capsule, (0.4, 0.5)), (Cylinder, (0.5, 0.9))):
+        for _ in range(3):
+            position = rng.uniform(-0.4, 0.4, 3)
+            found = overlap(make(*numbers), Placed(other(*sizes), position, quaternion(rng)))
+            of_sizes = found.shape_gradient[0, : len(numbers)] @ numbers + found.shape_gradient[1, : len(sizes)] @ sizes
+            assert of_sizes - found.gradient[0, :3] @ position == pytest.approx(3 * found.volume, rel=1e-9)
+
+
+def test_a_ball_and_an_ellipsoid_have_the_derivative_by_the_radius_alone():
+    found = overlap(Sphere(0.5), Placed(Ellipsoid((0.4, 0.5, 0.6)), (0.3, 0.2, 0.1))).shape_gradient
+    volumes = [overlap(Sphere(r), Placed(Ellipsoid((0.4, 0.5, 0.6)), (0.3, 0.2, 0.1))).volume for r in (0.4999, 0.5001)]
+    assert found[0, 0] == pytest.approx((volumes[1] - volumes[0]) / 2e-4, rel=1e-6) and np.isnan(found[1]).all()
+    assert np.isnan(overlap(Box((1, 1, 0.2)), Ellipsoid((0.4, 0.5, 0.6))).shape_gradient).all()
+    assert np.isnan(overlap(Capsule(0.5, 0), Box((0.3, 0.3, 0.3))).shape_gradient[0, 1])
 
 
 def test_three_boxes():
@@ -176,10 +204,18 @@ def test_gradients_of_rectangles_against_differences():
             assert_allclose(column, slope, atol=1e-7)
 
 
-def test_round_shapes_have_no_gradient_by_arrays():
-    with pytest.raises(ValueError, match=r"^a must be boxes or rectangles$"):
-        arrays.volume_gradient(arrays.spheres([1]), arrays.boxes([[1, 1, 1]]), aligned=True)
+def test_gradients_of_arrays_of_round_shapes():
+    balls, tubes = arrays.spheres([1, 2], [[0.5, 0, 0], [9, 0, 0]]), arrays.cylinders([0.5], [1])
+    of_balls, of_tubes = arrays.volume_gradient(balls, tubes)
+    alone = overlap(balls[0], tubes[0])
+    assert of_balls.sizes.tolist() == [[alone.shape_gradient[0, 0]], [0]]
+    assert of_tubes.sizes.tolist() == [alone.shape_gradient[1, :2].tolist()]
+    assert of_balls.positions.tolist() == [alone.gradient[0, :3].tolist(), [0, 0, 0]]
+
+
+def test_weights_that_do_not_fit_are_refused():
+    box = arrays.boxes([[1, 1, 1]])
     with pytest.raises(
         ValueError, match=r"^weights must be an array of numbers, one for each pair, not of shape \(2,\)"
     ):
-        arrays.volume_gradient(arrays.boxes([[1, 1, 1]]), arrays.boxes([[1, 1, 1]]), [1, 2])
+        arrays.volume_gradient(box, box, [1, 2])

@@ -38,6 +38,7 @@ struct BothPieces {
     a.clear(), b.clear();
     cut(pair.a, pair.b, common, 0, pair.reference, pair.inside, a);
     cut(pair.b, pair.a, common, 1, pair.reference, pair.inside, b);
+    if (pair.counted) count(pair);
     return grown(pair.outwards);
   }
 
@@ -50,6 +51,22 @@ struct BothPieces {
 
   /// The number of rounds of a pair of pieces.
   int rounds_of(int i, int j) const { return (a.pieces[i].round >= 0) + (b.pieces[j].round >= 0); }
+  /// Owner 0 for the counted surface, owner 1 for all other surface.
+  void count(const SlicedPair& pair) {
+    const auto [body, axis] = *pair.counted;
+    const Placed& placed = body == 0 ? pair.a : pair.b;
+    const Vec3 middle = placed.pose.translation - rounded(pair.inside);
+    for (Pieces* pieces : {&a, &b}) {
+      const bool of_body = pieces == (body == 0 ? &a : &b);
+      for (Wall& wall : pieces->walls) {
+        constexpr double kAcross = 0.5;  // faces of boxes and cylinders are across the axis, or along it
+        const bool across = std::abs(dot(rounded(wall.normal), axis)) > kAcross;
+        if (wall.owner != slicing::kCut) wall.owner = of_body && across ? 0 : 1;
+      }
+      for (Round& round : pieces->rounds)
+        round.owner = of_body && round.ball && dot(rounded(round.centre) - middle, axis) > 0 ? 0 : 1;
+    }
+  }
   bool grown(double outwards) { return outwards == 0 || grow(least_radius(a) > least_radius(b) ? a : b, outwards); }
   void get_rounds(int i, int j, std::vector<Round>& rounds) const {
     rounds.clear();
@@ -222,6 +239,7 @@ struct MitredPieces {
 std::optional<RoundMeasures> measure_mitred(const SlicedPair& pair, const EnclosingPolytope& around) {
   // If margins are much larger than the contact is deep, doubles rarely give what rounds leave out.
   constexpr double kMostMargin = 16;
+  if (pair.counted) return std::nullopt;
   const double margin = std::max(core_radius(pair.a.shape), core_radius(pair.b.shape));
   if (!(margin <= kMostMargin * around.inner_radius())) return std::nullopt;
   const Scratch<MitredPieces> pieces;

@@ -24,6 +24,13 @@ struct RoundMeasures {
   int facets_touched = 0;    ///< number of planes of the bodies in the measures
 };
 
+/// A part of the surface of one body that counts as all of the first body's surface. All other surface counts as the
+/// second body's. It is the flat faces across an axis, and the ends of a capsule on the side that the axis points to.
+struct CountedSurface {
+  int body;   ///< 0 or 1
+  Vec3 axis;  ///< unit, in the world
+};
+
 /// A pair that overlaps.
 struct SlicedPair {
   const Placed &a, &b;  ///< about the reference
@@ -33,6 +40,7 @@ struct SlicedPair {
   bool with_area = true;       ///< areas are wanted; they may be left out otherwise
   int owner = 0;               ///< the body whose surface the patch sums
   PatchSums* patch = nullptr;  ///< added to, if not null; relative to `inside`
+  std::optional<CountedSurface> counted = {};  ///< only for balls, capsules, cylinders, rounded hulls and polyhedra
 };
 
 /// Both bodies are cut into pieces: the parts of a ball or a cylinder, or of no round shape, within planes. Slices are
