@@ -1,0 +1,56 @@
+"""The page about IoU of boxes, docs/boxes.md, from the results file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from harness import results
+from harness.page import duration, named, table, times, write
+
+TRUE = {"#1054": "1/7", "#1082": "0.944907", "#1429": "0.887689", "#1551": "1"}
+
+
+def write_page(path: Path, folder: Path) -> Path:
+    (note,), rows = results.read(path)
+    found: dict[tuple[str, str], dict[str, float]] = {}
+    for row in rows:
+        found.setdefault((row["part"], row["name"]), {})[row["figure"]] = float(row["value"])
+
+    def of(part: str) -> dict[str, dict[str, float]]:
+        return {name: each for (of_part, name), each in found.items() if of_part == part}
+
+    errors = [
+        [
+            f"{name} m",
+            f"{each['median IoU']:.3f}",
+            f"{each['ours']:.0e}",
+            f"{each['points']:.0e}",
+            *(f"{each[figure]:.0f}" for figure in ("over 1e-3", "over 0.05", "above 1", "refused")),
+            f"{each['largest']:.2g}",
+        ]
+        for name, each in of("errors").items()
+    ]
+    cases = [
+        [issue, TRUE[issue], f"{each['ours']:.6f}", f"{each['pytorch3d']:.6f}"]
+        for issue, each in of("published").items()
+    ]
+    speed = []
+    for name, each in of("times").items():
+        for who, us in each.items():
+            speed.append([name, who, duration(us), times(us / each["ours"])])
+    flat = of("flat")["rectangles"]
+    return write(
+        Path(__file__).with_suffix(".md"),
+        folder / "boxes.md",
+        results=named(path),
+        note=note,
+        errors=table(
+            ["offset", "median IoU", "ours", "100,000 points", "> 1e-3", "> 0.05", "IoU > 1", "refused", "largest"],
+            errors,
+        ),
+        cases=table(["issue", "true IoU", "ours", "pytorch3d"], cases),
+        speed=table(["boxes", "library", "per pair", "times ours"], speed, left=2),
+        difference=f"{flat['difference']:.0e}",
+        flat_ours=duration(flat["ours"]),
+        flat_shapely=duration(flat["shapely"]),
+    )

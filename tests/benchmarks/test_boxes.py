@@ -1,0 +1,32 @@
+"""The page about IoU of boxes is that of its results, and the peers agree with this package."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boxes import iou, page
+from overlapper import arrays
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_page_is_that_of_the_results(tmp_path):
+    (results,) = (ROOT / "benchmarks/results").glob("*/boxes.csv")
+    written = page.write_page(results, tmp_path).read_text(encoding="utf-8")
+    assert written == (ROOT / "docs/boxes.md").read_text(encoding="utf-8")
+
+
+def test_peers_agree_where_boxes_overlap_well():
+    rng = np.random.default_rng(2)
+    numbers = iou.random_boxes(rng, 4)
+    a, b = arrays.boxes(*numbers), arrays.boxes(*iou.beside(rng, numbers, 0.1))
+    volumes, ratios = arrays.volume(a, b, aligned=True), arrays.iou(a, b, aligned=True)
+    for k in range(4):
+        assert iou.by_scipy(a, b, k) == pytest.approx(volumes[k], rel=1e-9)
+        assert iou.by_points(rng, a, b, k) == pytest.approx(ratios[k], abs=1e-2)
+    assert iou.proved_error(a, b, volumes) < 1e-13
+    row = np.array([1, 2, 3, 4, 0.5])
+    assert iou.rectangle(row).area == pytest.approx(12) and iou.rectangle(row).centroid.coords[0] == pytest.approx(
+        (1, 2)
+    )
