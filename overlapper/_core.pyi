@@ -1,6 +1,6 @@
 """Convex shapes and the polytopes they share."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, Any, Literal, overload
 
 import numpy
@@ -1154,6 +1154,25 @@ class Batch:
             Indices i < j of the two shapes, sorted.
         """
 
+class PairMask:
+    """
+    Which pairs of shapes may be measured.
+
+    Parameters
+    ----------
+    groups : (k,) array_like of int
+        The group of each shape: a row of the table.
+    table : (g, g) ndarray of bool
+        Whether shapes of a group may be measured with shapes of another group. It is symmetric.
+    """
+
+    def __init__(self, groups: numpy.typing.ArrayLike, table: numpy.typing.NDArray[numpy.bool_]) -> None: ...
+
+def masked_overlaps(batch: Batch, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, mask: PairMask, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto') -> Overlaps:
+    """
+    The overlaps of the pairs of a Batch whose boxes meet and that `mask` admits. Separated pairs have no row.
+    """
+
 def overlaps(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
     """
     Overlaps of many pairs of placed shapes in one call, as arrays. Other Python threads run meanwhile.
@@ -1212,14 +1231,41 @@ def candidate_pairs(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | 
         Indices i < j of the two shapes, sorted.
     """
 
-def world_poses(frames: Sequence[Any], which: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+def world_poses(frames: Sequence[Any] | numpy.typing.NDArray[numpy.float64], which: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     (k, 3) positions in m and (k, 4) quaternions xyzw in the world of what is fixed to moving frames.
 
-    `frames` begin with position and quaternion, as pybullet's answers do; thing i is fixed to frame `which[i]` at
-    `positions[i]` and `orientations[i]` of it. Quaternions are of any length but 0; those in the world are as long as
-    `orientations`. Of a frame that is not a number, neither are they.
+    `frames` begin with position and quaternion, as pybullet's answers do, or they are rows (n, 7) of an array. Thing i is
+    fixed to frame `which[i]` at `positions[i]` and `orientations[i]` of it. Quaternions are of any length but 0. Those in
+    the world are as long as `orientations`. They are not finite where a frame is not.
     """
+
+def chosen_frames(positions: numpy.typing.ArrayLike, quaternions: numpy.typing.ArrayLike, which: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    (k, 7) positions and quaternions xyzw in the rows `which`, for `world_poses`; `quaternions` are wxyz.
+    """
+
+def finite_within(positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, farthest: float) -> bool:
+    """
+    Whether all numbers are finite, and those of the positions less than `farthest` in size.
+    """
+
+class Snapshot:
+    """
+    Copies of arrays of numpy, to notice edits.
+
+    Parameters
+    ----------
+    arrays : iterable of ndarray
+        Contiguous arrays of any type.
+    """
+
+    def __init__(self, arrays: Iterable[numpy.typing.NDArray[Any]]) -> None: ...
+
+    def renew(self) -> bool:
+        """
+        Copy the arrays again. True if any bit has changed since the last copy.
+        """
 
 class ShapeArray:
     """

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper import _core
 from overlapper.simulation.collision_rules import Mask, Rules
 from overlapper.simulation.layout import Layout
 
@@ -29,12 +30,16 @@ def listed(pairs: Any) -> list[tuple[Any, Any]]:
     return [(a, b) for a, b in asked]
 
 
+TABLED = 256  # the most links whose pairs are decided in advance
+
+
 class AskedPairs:
     """The chosen pairs of a layout, whose bodies have these `links`. The codes of a list are kept for the next step."""
 
     def __init__(self, layout: Layout, links: Mapping[int, Collection[int]]) -> None:
         self.layout, self._links = layout, links
         self._listed: tuple[list[tuple[Who, Who]], Codes] | None = None
+        self._masked: tuple[Rules, _core.PairMask | None] | None = None
 
     def chosen(self, pairs: NDArray[np.int32], among: Numbered, rules: Rules) -> Mask:
         """Which of these pairs of shapes are chosen."""
@@ -45,6 +50,23 @@ class AskedPairs:
             return np.isin(first * np.int64(len(self.layout.keys)) + second, self._codes(among))
         a, b = self.layout.colliders[first], self.layout.colliders[second]
         return np.asarray((a != b) & rules.allow(a, b))
+
+    def mask(self, rules: Rules) -> _core.PairMask | None:
+        """The pairs that the simulator lets collide, as a table. None if there is no table, or not yet.
+
+        The table is made at the second call with the same rules. Rules that change in every step get no table.
+        """
+        if not rules.lasting or len(self.layout.collider_rows) > TABLED:
+            return None
+        if self._masked is None or self._masked[0] is not rules:
+            self._masked = rules, None
+        elif self._masked[1] is None:
+            count = len(self.layout.collider_rows)
+            table = np.zeros((count, count), dtype=bool)
+            first, second = np.triu_indices(count, 1)
+            table[first, second] = table[second, first] = rules.allow(first, second)
+            self._masked = rules, _core.PairMask(self.layout.colliders, table)
+        return self._masked[1]
 
     def possible(self, among: Numbered, rules: Rules) -> int:
         """The number of chosen pairs of shapes, at any poses."""

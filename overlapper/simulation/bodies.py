@@ -12,7 +12,7 @@ from typing import Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Overlaps, Placed, Shape, overlaps
+from overlapper import Overlaps, Placed, Shape, _core, overlaps
 from overlapper.simulation.asked_pairs import Among, AskedPairs, Numbered, Who, listed
 from overlapper.simulation.cautions import SkippedShapeWarning
 from overlapper.simulation.collision_rules import Mask, Rules, partners
@@ -98,11 +98,17 @@ class AnyBodies:
         if among == "simulated":
             for caution in self._source.cautions(self._layout):
                 warnings.warn(caution, stacklevel=2)
-        candidates, layout = self.pairs(among), self._layout
+        layout = self._layout
         self._asked = among if isinstance(among, str) else self._pairs.possible(among, self._rules)
-        self._found = layout.batch.overlaps(
-            layout.positions, layout.orientations, candidates, tolerance, threads, method, separated=False
-        )
+        mask = self._pairs.mask(self._rules) if among == "simulated" else None
+        if mask:
+            self._found = _core.masked_overlaps(
+                layout.batch, layout.positions, layout.orientations, mask, tolerance, threads, method
+            )
+        else:
+            self._found = layout.batch.overlaps(
+                layout.positions, layout.orientations, self.pairs(among), tolerance, threads, method, separated=False
+            )
         contacts = Contacts(layout.key_rows, self._found, self._names, self._source.contact)
         self._last = contacts, layout, partial(self._pairs.chosen, among=among, rules=self._rules)
         return contacts

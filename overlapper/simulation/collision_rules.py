@@ -38,6 +38,9 @@ class Colliders:
 class Rules(Protocol):
     """Which colliders may collide. A collider is given by its row in `Layout.collider_rows`."""
 
+    lasting: bool = True
+    """False if the rules may give another answer for the same pair at another time."""
+
     def allow(self, first: Indices, second: Indices) -> Mask:
         """Whether the colliders in these rows may collide, pair by pair; first < second."""
 

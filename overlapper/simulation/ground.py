@@ -28,6 +28,7 @@ class GroundBelow:
         self._slack = np.maximum(min(ground.field.spacing) / 2, reach / 4)
         self._asked = np.full((len(reach), 3), np.inf)
         self._frame: Pose = ()
+        self._bounded = np.isfinite(reach)
         self._near: list[Numbers] = [np.empty(0, dtype=np.int64)] * len(reach)
 
     def moved(self, frame: Pose, centres: Array, meets: Mask) -> bool:
@@ -40,8 +41,10 @@ class GroundBelow:
             self._origin, turn = _core.world_poses([frame], FIRST, ground.position[None], ground.orientation[None])
             self._axes = rotated(turn, np.eye(3)).T
         local = (centres - self._origin) @ self._axes
-        meets = meets & np.isfinite(self._reach) & np.isfinite(local).all(axis=1)
-        moved = meets & ~(np.abs(local - self._asked).max(axis=1) <= self._slack)
+        moved = meets & self._bounded & ~(np.abs(local - self._asked).max(axis=1) <= self._slack)
+        if not moved.any():
+            return False
+        moved &= np.isfinite(local).all(axis=1)
         self._asked[moved] = local[moved]
         for k in np.flatnonzero(moved):
             reach = self._reach[k] + self._slack[k]
@@ -61,6 +64,8 @@ class Grounds:
         self._rows = np.empty(0, dtype=np.intp)
         self._keys = np.empty((0, 3), dtype=np.int64)
         self._shapes: list[Shape] = []
+        self._meets: dict[LinkKey, Mask] = {}
+        self._rules: Rules | None = None  # those by which `_meets` was found
 
     def follow(self, layout: Layout, bodies: Mapping[int, ModelledBody]) -> None:
         """Follow a new layout, after bodies have come or gone."""
@@ -75,6 +80,7 @@ class Grounds:
         same = {key: below for key, below in self._below.items() if below.ground is grounds.get(key)}
         reach = layout.reach(self._rows) if len(same) < len(grounds) else np.empty(0)
         self._below = {key: same.get(key) or GroundBelow(ground, reach) for key, ground in grounds.items()}
+        self._rules = None
 
     def changed(self, layout: Layout, rules: Rules, bodies: Mapping[int, ModelledBody]) -> dict[int, ModelledBody]:
         """The height fields that need more prisms, or fewer than half of their prisms, with the new prisms.
@@ -82,11 +88,13 @@ class Grounds:
         The new prisms are those that shapes may meet by the simulator's rules, and some around them.
         """
         found: dict[int, ModelledBody] = {}
-        colliders = layout.colliders[self._rows]
+        if self._below and not (self._rules is rules and rules.lasting):
+            self._rules, colliders = rules, layout.colliders[self._rows]
+            for key in self._below:
+                own = np.full(len(colliders), layout.collider_rows[key])
+                self._meets[key] = rules.allow(np.minimum(own, colliders), np.maximum(own, colliders))
         for (id, link), below in self._below.items():
-            own = np.full(len(colliders), layout.collider_rows[id, link])
-            meets = rules.allow(np.minimum(own, colliders), np.maximum(own, colliders))
-            if not below.moved(layout.frame((id, link)), layout.positions[self._rows], meets):
+            if not below.moved(layout.frame((id, link)), layout.positions[self._rows], self._meets[id, link]):
                 continue
             body, needed = found.get(id, bodies[id]), below.numbers()
             modelled = {each.index: each for each in body.shapes if each.link == link}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
@@ -18,6 +17,9 @@ FARTHEST = 1e25  # m; the core measures nothing beyond
 Pose = Sequence[Sequence[float]]
 """Begins with a position in m and a quaternion xyzw."""
 
+Frames = Sequence[Pose] | Array
+"""Poses, or an array (n, 7) with a position and a quaternion xyzw in each row."""
+
 
 class Poses(Protocol):
     """The frames of the bases and links that shapes are fixed to."""
@@ -26,7 +28,7 @@ class Poses(Protocol):
     def colliders(self) -> Sequence[LinkKey]:
         """(body, link) of each frame, in the order of `read`."""
 
-    def read(self) -> Sequence[Pose]:
+    def read(self) -> Frames:
         """The present frames."""
 
 
@@ -58,7 +60,7 @@ class Layout:
             for id, shapes in shaped.items()
         }
         self.poses = poses(links)
-        self._read: Sequence[Pose] = ()
+        self._read: Frames = ()
         self.collider_rows = {each: row for row, each in enumerate(sorted(self.poses.colliders))}
         self.colliders = np.array([self.collider_rows[id, link] for id, link, _ in self.keys], dtype=int)
         self._place = {each: row for row, each in enumerate(self.poses.colliders)}
@@ -68,7 +70,8 @@ class Layout:
 
     def frame(self, collider: LinkKey) -> Pose:
         """The frame of a collider at the last `pose`."""
-        return self._read[self._place[collider]]
+        frame = self._read[self._place[collider]]
+        return (frame[:3].tolist(), frame[3:].tolist()) if isinstance(frame, np.ndarray) else frame
 
     def reach(self, rows: NDArray[np.intp]) -> Array:
         """(n,) how far the shapes in these rows extend from their own origins, m; infinite for planes."""
@@ -80,7 +83,7 @@ class Layout:
         self.positions, self.orientations = _core.world_poses(
             self._read, self._places, self._local_positions, self._local_orientations
         )
-        if np.abs(self.positions).max(initial=0.0) < FARTHEST and math.isfinite(self.orientations.sum()):
+        if _core.finite_within(self.positions, self.orientations, FARTHEST):
             return set()
         finite = (np.abs(self.positions) < FARTHEST).all(axis=1) & np.isfinite(self.orientations).all(axis=1)
         return {*self.owners[~finite].tolist()}

@@ -586,3 +586,25 @@ def test_work_waits_until_a_library_is_imported(monkeypatch, tmp_path):
     when_imported("waited_for", lambda: heard.append("at once"))
     assert heard == [True, "at once"]
     del sys.modules["waited_for"]
+
+
+def test_the_table_of_pairs_gives_the_overlaps_of_the_rule():
+    """The first call asks the rule about each pair, and later calls look the pairs up in a table."""
+    geoms = "".join(
+        f'<body pos="{0.05 * k} 0 0"><freejoint/><geom type="box" size=".1 .1 .1" contype="{1 + k % 3}" '
+        f'conaffinity="{1 + k % 2}"/></body>'
+        for k in range(8)
+    )
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    bodies = Bodies(model, data)
+    by_rule, by_table = bodies.overlaps(), bodies.overlaps()
+    assert len(by_rule) == 20 and by_table.keys.tolist() == by_rule.keys.tolist()
+    assert by_table.overlaps.examined == by_rule.overlaps.examined == 20
+    assert by_table.overlaps.volume.tobytes() == by_rule.overlaps.volume.tobytes()
+    model.geom_contype[3] = model.geom_conaffinity[3] = 0
+    bodies.update()
+    masked = bodies.overlaps(), bodies.overlaps()
+    assert [each.keys.tolist() for each in masked] == [masked[0].keys.tolist()] * 2
+    assert 0 < len(masked[0]) < 20 and not (masked[1].keys[:, [1, 4]] == 3).any()

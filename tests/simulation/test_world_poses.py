@@ -63,3 +63,43 @@ def test_a_frame_that_is_not_a_number_is_passed_on():
     positions, orientations = _core.world_poses([nowhere, AT_REST], np.array([0, 1]), np.ones((2, 3)), [AT_REST[1]] * 2)
     assert np.isnan(positions[0]).all() and np.isnan(orientations[0]).all()
     assert np.isfinite(positions[1]).all()
+
+
+def test_rows_of_an_array_are_frames_like_those_of_pybullet():
+    rng = np.random.default_rng(7)
+    rows, which = rng.normal(size=(4, 7)), rng.integers(4, size=6)
+    local = rng.normal(size=(6, 3)), rng.normal(size=(6, 4))
+    given = [(row[:3].tolist(), row[3:].tolist()) for row in rows]
+    for found, expected in zip(_core.world_poses(rows, which, *local), _core.world_poses(given, which, *local)):
+        assert found.tobytes() == expected.tobytes()
+    with pytest.raises(ValueError, match=r"frames must be an array of shape \(n, 7\), not of shape \(4, 6\)"):
+        _core.world_poses(rows[:, :6], which, *local)
+
+
+def test_chosen_frames_have_the_scalar_part_last():
+    positions, quaternions = np.arange(6.0).reshape(2, 3), np.array([[1.0, 2, 3, 4], [5, 6, 7, 8]])
+    assert _core.chosen_frames(positions, quaternions, [1, 0]).tolist() == [
+        [3, 4, 5, 6, 7, 8, 5],
+        [0, 1, 2, 2, 3, 4, 1],
+    ]
+    with pytest.raises(ValueError, match="which must index the positions"):
+        _core.chosen_frames(positions, quaternions, [2])
+    with pytest.raises(ValueError, match="quaternions must have a row for each of `positions`"):
+        _core.chosen_frames(positions, quaternions[:1], [0])
+
+
+def test_finite_within_refuses_far_positions_and_numbers_that_are_not_finite():
+    assert _core.finite_within([[1, -9, 0]], [[0, 0, 0, 99]], 10)
+    assert not _core.finite_within([[1, -10, 0]], [[0, 0, 0, 1]], 10)
+    assert not _core.finite_within([[np.nan, 0, 0]], [[0, 0, 0, 1]], 10)
+    assert not _core.finite_within([[0, 0, 0]], [[0, 0, np.inf, 1]], 10)
+
+
+def test_a_snapshot_notices_edits_of_any_type_once():
+    arrays = [np.zeros(3), np.zeros((2, 2), dtype=np.int32), np.empty(0), np.array([np.nan])]
+    snapshot = _core.Snapshot(arrays)
+    assert not snapshot.renew()
+    arrays[1][1, 0] = 5
+    assert snapshot.renew() and not snapshot.renew()
+    with pytest.raises(TypeError, match="arrays must be arrays of numpy"):
+        _core.Snapshot([[1.0]])

@@ -332,7 +332,7 @@ std::vector<IndexPair> Batch::candidate_pairs(std::span<const double> positions,
 
 Overlaps Batch::overlaps(std::span<const double> positions, std::span<const double> orientations,
                          std::optional<std::span<const IndexPair>> given, bool separated, double tolerance,
-                         Method method, int threads, bool& finished) {
+                         Method method, int threads, bool& finished, const PairMask* mask) {
   if (!(tolerance > 0 && tolerance < 1))
     throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
   Borrowed memory(*this);
@@ -340,6 +340,7 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   finished = true;
   if (!given) try {
       memory->find_pairs(memory->candidates);
+      if (mask) std::erase_if(memory->candidates, [&](const IndexPair& pair) { return !mask->admits(pair); });
     } catch (const Cancelled&) {
       finished = false;
       memory->candidates.clear();

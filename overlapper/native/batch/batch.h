@@ -120,6 +120,15 @@ inline constexpr std::tuple kColumns{
                  [](const Overlaps::Row& row) { return static_cast<char>(overlapper::widened(row.measures.way)); },
                  "(p,) True where the volume was computed again in double-double arithmetic."}};
 
+/// Which pairs may be measured: shapes belong to groups, and a table says for each pair of groups whether it may.
+struct PairMask {
+  std::vector<int> group;   ///< of each shape
+  std::vector<char> table;  ///< row by row, as many rows and columns as groups
+  size_t groups = 0;
+
+  bool admits(const IndexPair& pair) const { return table[groups * group[pair[0]] + group[pair[1]]]; }
+};
+
 /// The pairs of moving shapes. Results of the last call are reused if they prove the same answer. Several threads may
 /// call it at once. One thread uses the memory, and the others work without it.
 class Batch {
@@ -133,11 +142,12 @@ class Batch {
   std::vector<IndexPair> candidate_pairs(std::span<const double> positions, std::span<const double> orientations);
 
   /// A row for each pair that overlaps or touches, and with `separated` also for the other pairs. The pairs are
-  /// `pairs`, or else all pairs whose boxes meet. The bits depend neither on `threads` nor on earlier calls. If the
-  /// caller cancels, `finished` becomes false, and only finished pairs have rows.
+  /// `pairs`, or else all pairs whose boxes meet, if `mask` admits them or is null. The bits depend neither on
+  /// `threads` nor on earlier calls. If the caller cancels, `finished` becomes false, and only finished pairs have
+  /// rows.
   Overlaps overlaps(std::span<const double> positions, std::span<const double> orientations,
                     std::optional<std::span<const IndexPair>> pairs, bool separated, double tolerance, Method method,
-                    int threads, bool& finished);
+                    int threads, bool& finished, const PairMask* mask = nullptr);
 
  private:
   struct Memory;

@@ -94,6 +94,9 @@ using Doubles = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 
 /// Any array_like as contiguous doubles. `expected` describes the required shape, for the message.
 inline Doubles to_doubles(nb::handle value, const std::string& name, const std::string& expected) {
+  // An array of this kind is taken as it is, because a call of numpy takes longer than all other work on few poses.
+  Doubles as_it_is;
+  if (nb::ndarray_check(value) && nb::try_cast(value, as_it_is, false)) return as_it_is;
   try {
     return nb::cast<Doubles>(nb::module_::import_("numpy").attr("ascontiguousarray")(value, "dtype"_a = "float64"));
   } catch (nb::python_error& error) {
@@ -145,6 +148,15 @@ inline std::vector<std::int64_t> to_indices(nb::handle value, const std::string&
   const std::string expected = columns
                                    ? "must be an array of whole numbers of shape (p, " + std::to_string(columns) + ")"
                                    : "must be an array of whole numbers";
+  const auto in_shape = [&](const auto& rows) {
+    return columns ? rows.ndim() == 2 && rows.shape(1) == static_cast<size_t>(columns) : rows.ndim() == 1;
+  };
+  nb::ndarray<const std::int64_t, nb::c_contig, nb::device::cpu> wide;
+  nb::ndarray<const std::int32_t, nb::c_contig, nb::device::cpu> narrow;
+  if (nb::ndarray_check(value)) {
+    if (nb::try_cast(value, wide, false) && in_shape(wide)) return {wide.data(), wide.data() + wide.size()};
+    if (nb::try_cast(value, narrow, false) && in_shape(narrow)) return {narrow.data(), narrow.data() + narrow.size()};
+  }
   nb::object array;
   try {
     const nb::module_ numpy = nb::module_::import_("numpy");
@@ -158,8 +170,7 @@ inline std::vector<std::int64_t> to_indices(nb::handle value, const std::string&
     fail(name, expected);
   }
   const auto rows = nb::cast<nb::ndarray<const std::int64_t, nb::c_contig, nb::device::cpu>>(array);
-  const bool in_shape = columns ? rows.ndim() == 2 && rows.shape(1) == static_cast<size_t>(columns) : rows.ndim() == 1;
-  if (!in_shape && rows.size() > 0) fail(name, expected);
+  if (!in_shape(rows) && rows.size() > 0) fail(name, expected);
   return {rows.data(), rows.data() + rows.size()};
 }
 

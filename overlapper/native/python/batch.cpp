@@ -61,9 +61,9 @@ std::vector<IndexPair> to_pairs(nb::handle given, size_t k) {
   return pairs;
 }
 
-nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orientations, nb::handle pairs,
-                          nb::handle tolerance_given, nb::handle threads_given, nb::handle method_name,
-                          bool separated) {
+nb::object overlaps_among(Batch& batch, nb::handle positions, nb::handle orientations, nb::handle pairs,
+                          nb::handle tolerance_given, nb::handle threads_given, nb::handle method_name, bool separated,
+                          const PairMask* mask) {
   const size_t k = batch.shapes().size();
   const auto [p, q] = to_poses(positions, orientations, k);
   const double tolerance = to_double(tolerance_given, "tolerance");
@@ -76,13 +76,36 @@ nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orienta
   Overlaps found;
   {
     const nb::gil_scoped_release release;
-    found = batch.overlaps(p, q, span, given && separated, tolerance, method, threads, finished);
+    found = batch.overlaps(p, q, span, given && separated, tolerance, method, threads, finished, mask);
   }
   nb::object answer = nb::cast(std::move(found));
   if (finished) return answer;
   nb::python_error interruption;
   interruption.value().attr("overlaps") = answer;
   throw interruption;
+}
+
+nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orientations, nb::handle pairs,
+                          nb::handle tolerance, nb::handle threads, nb::handle method, bool separated) {
+  return overlaps_among(batch, positions, orientations, pairs, tolerance, threads, method, separated, nullptr);
+}
+
+PairMask to_mask(nb::handle groups_given, nb::handle table_given) {
+  PairMask mask;
+  for (std::int64_t group : to_indices(groups_given, "groups")) mask.group.push_back(static_cast<int>(group));
+  const auto table = nb::cast<nb::ndarray<const bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>>(table_given, false);
+  mask.groups = table.shape(0);
+  if (table.shape(1) != mask.groups) fail("table", "must have as many columns as rows");
+  for (int group : mask.group)
+    if (group < 0 || group >= static_cast<int>(mask.groups)) fail("groups", "must be rows of the table");
+  mask.table.assign(table.data(), table.data() + table.size());
+  return mask;
+}
+
+nb::object masked_overlaps(Batch& batch, nb::handle positions, nb::handle orientations, const PairMask& mask,
+                           nb::handle tolerance, nb::handle threads, nb::handle method) {
+  if (mask.group.size() != batch.shapes().size()) fail("mask", "must have a group for each shape of the batch");
+  return overlaps_among(batch, positions, orientations, nb::none(), tolerance, threads, method, false, &mask);
 }
 
 nb::object candidates(Batch& batch, nb::handle positions, nb::handle orientations) {
@@ -405,6 +428,26 @@ int to_threads(nb::handle given) {
 void define_batch(nb::module_& m) {
   define_overlaps_class(m);
   define_batch_class(m);
+  nb::class_<PairMask>(m, "PairMask", R"(Which pairs of shapes may be measured.
+
+Parameters
+----------
+groups : (k,) array_like of int
+    The group of each shape: a row of the table.
+table : (g, g) ndarray of bool
+    Whether shapes of a group may be measured with shapes of another group. It is symmetric.)")
+      .def(
+          "__init__",
+          [](PairMask* self, nb::handle groups, nb::handle table) { new (self) PairMask(to_mask(groups, table)); },
+          "groups"_a, "table"_a,
+          nb::sig("def __init__(self, groups: numpy.typing.ArrayLike, table: numpy.typing.NDArray[numpy.bool_]) -> "
+                  "None"));
+  m.def("masked_overlaps", &masked_overlaps, "batch"_a, "positions"_a, "orientations"_a, "mask"_a, "tolerance"_a = 1e-3,
+        "threads"_a.none() = 1, "method"_a = "auto",
+        nb::sig("def masked_overlaps(batch: Batch, positions: numpy.typing.ArrayLike, orientations: "
+                "numpy.typing.ArrayLike, mask: PairMask, tolerance: float = 0.001, threads: int | None = 1, method: "
+                "typing.Literal['auto', 'paper'] = 'auto') -> Overlaps"),
+        "The overlaps of the pairs of a Batch whose boxes meet and that `mask` admits. Separated pairs have no row.");
   m.def(
       "overlaps",
       [](nb::handle shapes, nb::handle positions, nb::handle orientations, nb::handle pairs, nb::handle tolerance,

@@ -1,3 +1,8 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+
 #include "python/arrays.h"
 #include "python/frames.h"
 
@@ -13,13 +18,30 @@ Quaternion normalized(Quaternion given) {
   return {q.x / length, q.y / length, q.z / length, q.w / length};
 }
 
+/// The frames as pybullet's answers, or as rows of an array: position, then quaternion x, y, z, w.
+std::vector<Frame> to_frames(nb::handle given) {
+  std::vector<Frame> frames;
+  if (nb::ndarray_check(given)) {
+    const Doubles rows = to_doubles(given, "frames", "an array of shape (n, 7)");
+    if (rows.ndim() != 2 || rows.shape(1) != 7)
+      fail("frames", "must be an array of shape (n, 7), not of shape " + shape_text(rows));
+    frames.reserve(rows.shape(0));
+    for (size_t i = 0; i < rows.shape(0); ++i) {
+      const double* f = rows.data() + 7 * i;
+      frames.push_back({{f[0], f[1], f[2]}, {f[3], f[4], f[5], f[6]}});
+    }
+  } else {
+    for (nb::handle each : given) frames.push_back(to_frame(each));
+  }
+  return frames;
+}
+
 nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handle positions_given,
                       nb::handle orientations_given) {
-  std::vector<Frame> frames;
-  for (nb::handle each : frames_given) {
-    frames.push_back(to_frame(each));
-    if (zero(frames.back().orientation)) fail("frames", "must not have the zero quaternion");
-    frames.back().orientation = normalized(frames.back().orientation);
+  std::vector<Frame> frames = to_frames(frames_given);
+  for (Frame& frame : frames) {
+    if (zero(frame.orientation)) fail("frames", "must not have the zero quaternion");
+    frame.orientation = normalized(frame.orientation);
   }
   const std::vector<std::int64_t> which = to_indices(which_given, "which");
   const Doubles local_positions = to_doubles(positions_given, "positions", "an array of shape (k, 3)");
@@ -46,6 +68,70 @@ nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handl
                         to_numpy<Matrix>(std::move(orientations), {k, 4}));
 }
 
+const double* rows_of(const Doubles& array, const char* name, size_t columns) {
+  if (array.ndim() != 2 || array.shape(1) != columns)
+    fail(name, "must have the shape (n, " + std::to_string(columns) + "), not " + shape_text(array));
+  return array.data();
+}
+
+Matrix chosen_frames(nb::handle positions_given, nb::handle quaternions_given, nb::handle which_given) {
+  const Doubles positions = to_doubles(positions_given, "positions", "an array of shape (n, 3)");
+  const Doubles quaternions = to_doubles(quaternions_given, "quaternions", "an array of shape (n, 4)");
+  const std::vector<std::int64_t> which = to_indices(which_given, "which");
+  const double *p = rows_of(positions, "positions", 3), *q = rows_of(quaternions, "quaternions", 4);
+  const size_t n = positions.shape(0);
+  if (quaternions.shape(0) != n) fail("quaternions", "must have a row for each of `positions`");
+  std::vector<double> frames;
+  frames.reserve(7 * which.size());
+  for (std::int64_t i : which) {
+    if (i < 0 || i >= std::int64_t(n)) fail("which", "must index the positions");
+    const double *x = p + 3 * i, *wxyz = q + 4 * i;
+    frames.insert(frames.end(), {x[0], x[1], x[2], wxyz[1], wxyz[2], wxyz[3], wxyz[0]});
+  }
+  return to_numpy<Matrix>(std::move(frames), {which.size(), 7});
+}
+
+bool finite_within(nb::handle positions_given, nb::handle orientations_given, double farthest) {
+  const Doubles positions = to_doubles(positions_given, "positions", "an array of numbers");
+  const Doubles orientations = to_doubles(orientations_given, "orientations", "an array of numbers");
+  return std::all_of(positions.data(), positions.data() + positions.size(),
+                     [&](double x) { return std::abs(x) < farthest; }) &&
+         std::all_of(orientations.data(), orientations.data() + orientations.size(),
+                     [](double x) { return std::isfinite(x); });
+}
+
+/// Copies of arrays, to notice when somebody edits the arrays.
+class Snapshot {
+ public:
+  explicit Snapshot(nb::handle arrays) {
+    for (nb::handle each : arrays) {
+      if (!nb::ndarray_check(each)) throw nb::type_error("arrays must be arrays of numpy");
+      arrays_.push_back(nb::cast<Array>(each, false));
+      const std::byte* first = bytes(arrays_.back());
+      copies_.emplace_back(first, first + arrays_.back().nbytes());
+    }
+  }
+
+  bool renew() {
+    bool changed = false;
+    for (size_t i = 0; i < arrays_.size(); ++i) {
+      std::vector<std::byte>& copy = copies_[i];
+      const std::byte* now = bytes(arrays_[i]);
+      if (copy.empty() || std::memcmp(copy.data(), now, copy.size()) == 0) continue;
+      std::copy_n(now, copy.size(), copy.begin());
+      changed = true;
+    }
+    return changed;
+  }
+
+ private:
+  using Array = nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>;
+  static const std::byte* bytes(const Array& array) { return static_cast<const std::byte*>(array.data()); }
+
+  std::vector<Array> arrays_;
+  std::vector<std::vector<std::byte>> copies_;
+};
+
 }  // namespace
 
 Quaternion rotation_quaternion(const Mat3& rotation) {
@@ -58,7 +144,7 @@ Quaternion rotation_quaternion(const Mat3& rotation) {
   else if (largest == x.x) q = {1 + x.x - y.y - z.z, x.y + y.x, z.x + x.z, y.z - z.y};
   else if (largest == y.y) q = {x.y + y.x, 1 - x.x + y.y - z.z, y.z + z.y, z.x - x.z};
   else q = {z.x + x.z, y.z + z.y, 1 - x.x - y.y + z.z, x.y - y.x};
-  return unit(q);
+  return normalized(q);
 }
 
 std::pair<Vec3, Quaternion> matrix_pose(std::span<const double, 16> matrix, const std::string& name) {
@@ -81,15 +167,32 @@ std::pair<Vec3, Quaternion> matrix_pose(std::span<const double, 16> matrix, cons
 
 void define_poses(nb::module_& m) {
   m.def("world_poses", &world_poses, "frames"_a, "which"_a, "positions"_a, "orientations"_a,
-        nb::sig("def world_poses(frames: collections.abc.Sequence[typing.Any], which: "
-                "numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: "
+        nb::sig("def world_poses(frames: collections.abc.Sequence[typing.Any] | numpy.typing.NDArray[numpy.float64], "
+                "which: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: "
                 "numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], "
                 "numpy.typing.NDArray[numpy.float64]]"),
         R"((k, 3) positions in m and (k, 4) quaternions xyzw in the world of what is fixed to moving frames.
 
-`frames` begin with position and quaternion, as pybullet's answers do; thing i is fixed to frame `which[i]` at
-`positions[i]` and `orientations[i]` of it. Quaternions are of any length but 0; those in the world are as long as
-`orientations`. Of a frame that is not a number, neither are they.)");
+`frames` begin with position and quaternion, as pybullet's answers do, or they are rows (n, 7) of an array. Thing i is
+fixed to frame `which[i]` at `positions[i]` and `orientations[i]` of it. Quaternions are of any length but 0. Those in
+the world are as long as `orientations`. They are not finite where a frame is not.)");
+  m.def("chosen_frames", &chosen_frames, "positions"_a, "quaternions"_a, "which"_a,
+        nb::sig("def chosen_frames(positions: numpy.typing.ArrayLike, quaternions: numpy.typing.ArrayLike, which: "
+                "numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]"),
+        R"((k, 7) positions and quaternions xyzw in the rows `which`, for `world_poses`; `quaternions` are wxyz.)");
+  m.def("finite_within", &finite_within, "positions"_a, "orientations"_a, "farthest"_a,
+        nb::sig("def finite_within(positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, farthest: "
+                "float) -> bool"),
+        "Whether all numbers are finite, and those of the positions less than `farthest` in size.");
+  nb::class_<Snapshot>(m, "Snapshot", R"(Copies of arrays of numpy, to notice edits.
+
+Parameters
+----------
+arrays : iterable of ndarray
+    Contiguous arrays of any type.)")
+      .def(nb::init<nb::handle>(), "arrays"_a,
+           nb::sig("def __init__(self, arrays: collections.abc.Iterable[numpy.typing.NDArray[typing.Any]]) -> None"))
+      .def("renew", &Snapshot::renew, "Copy the arrays again. True if any bit has changed since the last copy.");
 }
 
 }  // namespace overlapper::python

@@ -36,10 +36,9 @@ def collidable(model: Any) -> Numbers:
     return np.flatnonzero(on)
 
 
-def drawn_from(model: Any) -> bytes:
+def drawn_from(model: Any) -> list[NDArray[Any]]:
     """All numbers of the model that define shapes. They may be edited at any time."""
-    arrays = model.geom_size, model.geom_type, model.geom_dataid, model.hfield_size, model.hfield_data
-    return b"".join(each.tobytes() for each in arrays)
+    return [model.geom_size, model.geom_type, model.geom_dataid, model.hfield_size, model.hfield_data]
 
 
 def modelled_bodies(model: Any, geoms: Numbers, names: dict[int, str]) -> dict[int, ModelledBody]:

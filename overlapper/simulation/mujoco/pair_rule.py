@@ -10,18 +10,17 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.simulation.collision_rules import Indices, Mask
+from overlapper.simulation.collision_rules import Indices, Mask, Rules
 from overlapper.simulation.mujoco.geoms import HFIELD, PLANE
 from overlapper.simulation.mujoco.silence import asked_flags
 
 NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
 ROWS = 1 << 20  # pairs counted at a time
-TABLED = 256  # the most geoms whose pairs are decided in advance
 
 
-def in_force(model: Any) -> bytes:
-    """All numbers of the model that the rule depends on. They may be edited at any time."""
-    arrays = (
+def in_force(model: Any) -> list[NDArray[Any]]:
+    """All numbers of the model that the rule depends on, except flags. They may be edited at any time."""
+    return [
         model.geom_contype,
         model.geom_conaffinity,
         model.body_contype,
@@ -30,9 +29,7 @@ def in_force(model: Any) -> bytes:
         model.pair_geom1,
         model.pair_geom2,
         model.exclude_signature,
-        np.array([asked_flags(model)]),
-    )
-    return b"".join(each.tobytes() for each in arrays)
+    ]
 
 
 def contact_filter() -> Callable[[Any, Any, int, int], int] | None:
@@ -41,7 +38,7 @@ def contact_filter() -> Callable[[Any, Any, int, int], int] | None:
     return None if isinstance(found, CFuncPtr) else found
 
 
-class PairRule:
+class PairRule(Rules):
     """Which pairs of these geoms may collide, by index into `geoms`.
 
     A pair may collide if the mask of one geom admits the other, if they are not welded together or both fixed, if
@@ -73,15 +70,10 @@ class PairRule:
         first, second = place[model.pair_geom1], place[model.pair_geom2]
         known = (first >= 0) & (second >= 0)
         self._explicit = np.unique(self._code(np.minimum(first, second)[known], np.maximum(first, second)[known]))
-        count = len(geoms)
-        all_pairs = np.indices((count, count)).reshape(2, -1) if count <= TABLED and not self._filter else None
-        self._table = None if all_pairs is None else self._decide(*all_pairs).reshape(count, count)
+        self.lasting = not self._filter
 
     def allow(self, first: Indices, second: Indices) -> Mask:
         """Whether the geoms at these indices may collide, pair by pair."""
-        return self._decide(first, second) if self._table is None else np.asarray(self._table[first, second])
-
-    def _decide(self, first: Indices, second: Indices) -> Mask:
         if self._none:
             return np.zeros(len(first), dtype=bool)
         group, mask, weld, parent = self._group, self._mask, self._weld, self._parent

@@ -8,15 +8,15 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from overlapper.simulation.layout import Layout, Pose
-from overlapper.simulation.model import LinkKey, ModelledBody, Skipped
+from overlapper import _core
+from overlapper.simulation.layout import Layout
+from overlapper.simulation.model import Array, LinkKey, ModelledBody, Skipped
 from overlapper.simulation.mujoco.contact import GeomContact
 from overlapper.simulation.mujoco.geoms import collidable, drawn_from, modelled_bodies
 from overlapper.simulation.mujoco.pair_rule import PairRule, contact_filter, in_force
+from overlapper.simulation.mujoco.silence import asked_flags
 from overlapper.simulation.mujoco.stepping import MujocoStepping
 from overlapper.simulation.source import Source
-
-XYZW = np.array([1, 2, 3, 0])
 
 
 class GeomPoses:
@@ -24,12 +24,11 @@ class GeomPoses:
 
     def __init__(self, data: Any, colliders: Sequence[LinkKey]) -> None:
         self.colliders = colliders
-        self._data, self._geoms = data, np.array([geom for _, geom in colliders], dtype=np.intp)
+        self._positions, self._quaternions = data.geom_xpos, data.geom_xquat
+        self._geoms = np.array([geom for _, geom in colliders], dtype=np.int64)
 
-    def read(self) -> list[Pose]:
-        positions = self._data.geom_xpos.take(self._geoms, axis=0)
-        orientations = self._data.geom_xquat.take(self._geoms, axis=0).take(XYZW, axis=1)
-        return list(zip(positions.tolist(), orientations.tolist()))
+    def read(self) -> Array:
+        return _core.chosen_frames(self._positions, self._quaternions, self._geoms)
 
 
 class MujocoSource(Source):
@@ -41,7 +40,11 @@ class MujocoSource(Source):
     def __init__(self, model: Any, data: Any, given_names: Mapping[int, str]) -> None:
         self._model, self._data, self._given_names = model, data, dict(given_names)
         self.bodies: dict[int, ModelledBody] = {}
-        self._read: tuple[bytes, bytes] | None = None  # the numbers of the model from which the bodies were read
+        self._quaternions = data.geom_xquat
+        # The numbers of the model from which the bodies and the rules were read.
+        self._drawn, self._in_force = _core.Snapshot(drawn_from(model)), _core.Snapshot(in_force(model))
+        self._flags = -1
+        self._was_read = False
         self._rule: tuple[object, Layout, PairRule] | None = None
         self._flexes_told = self._filter_told = False
 
@@ -50,15 +53,17 @@ class MujocoSource(Source):
         return float(self._model.opt.timestep)
 
     def refresh(self) -> list[Skipped] | None:
-        if self._model.ngeom and not self._data.geom_xquat.any():
+        if len(self._quaternions) and not self._quaternions.any():
             raise ValueError("data has no poses yet: call mujoco.mj_forward(model, data) first")
-        now = drawn_from(self._model), in_force(self._model)
-        if now == self._read:
+        flags, other_flags = asked_flags(self._model), self._flags
+        drawn, in_force = self._drawn.renew(), self._in_force.renew()
+        if self._was_read and not drawn and not in_force and flags == other_flags:
             return None
+        self._rule, self._flags = None, flags
         before = {each for body in self.bodies.values() for each in body.skipped} | set(
-            self.skipped if self._read else ()
+            self.skipped if self._was_read else ()
         )
-        self._read = now
+        self._was_read = True
         self.bodies = modelled_bodies(self._model, collidable(self._model), self._given_names)
         skipped = [*(each for body in self.bodies.values() for each in body.skipped), *self.skipped]
         return [each for each in skipped if each not in before]
@@ -67,11 +72,10 @@ class MujocoSource(Source):
         return GeomPoses(self._data, [(body, geom) for body, geoms in links.items() for geom in geoms])
 
     def rules(self, layout: Layout) -> PairRule:
-        assert self._read  # by `refresh`
-        now = self._read[1], contact_filter()
-        if not self._rule or self._rule[0] != now or self._rule[1] is not layout:
+        asked = contact_filter()
+        if not self._rule or self._rule[0] is not asked or self._rule[1] is not layout:
             geoms = np.array([geom for _, geom in layout.collider_rows], dtype=np.int64)
-            self._rule = now, layout, PairRule(self._model, self._data, geoms)
+            self._rule = asked, layout, PairRule(self._model, self._data, geoms)
         return self._rule[2]
 
     @property

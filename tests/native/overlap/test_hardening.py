@@ -109,6 +109,10 @@ def answers(seed):
     found["rectangles"] = [_core.volumes_around(rectangles, rectangles, False, 2), rectangles.volume]
     found["volume_gradients"] = _core.volume_gradients(boxes, boxes, np.ones(3), True, TOLERANCE, 2)
     found["fit_boxes"] = _core.fit_boxes([[[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)]], "corners")
+    found["chosen_frames"] = _core.chosen_frames(positions, orientations, np.arange(3))
+    assert _core.finite_within(positions, orientations, 1e3)
+    mask = _core.PairMask(np.arange(3), ~np.eye(3, dtype=bool))
+    found["masked_overlaps"] = _core.masked_overlaps(Batch(shapes), positions, orientations, mask, TOLERANCE)
     found["random_polytope"] = Placed(random_polytope(9, rng=rng))
     return {name: bits(value) for name, value in found.items()}
 
