@@ -695,3 +695,48 @@ def test_an_empty_model_steps():
     with pressing(model, data) as contact:
         contact.step()
     assert (len(contact), contact.substeps, data.time) == (0, 1, STEP)
+
+
+BELT = '<body name="belt" mocap="true" pos="0 0 .3"><geom type="box" size="1 1 .05" pos="0 0 -.05"/></body>'
+ON_BELT = 0.3 + HALF - G / 1e5
+
+
+@pytest.mark.parametrize("unchanged", [False, True])
+def test_a_moving_mocap_body_carries_a_cube_along(unchanged):
+    """The cube slides until it is as fast as the belt: over at most v² / 2 µ g, and three steps."""
+    speed = 0.1
+    model, data = simulated(BELT + free(CUBE, f"0 0 {ON_BELT}"))
+    with pressing(model, data) as contact:
+        for k in range(1, 501):
+            data.mocap_pos[0, 0] = speed * k * STEP
+            if unchanged:
+                mujoco.mj_step(model, data)
+                mujoco.mj_forward(model, data)  # at the same time, before the belt moves on
+            else:
+                contact.step()
+    behind = data.mocap_pos[0, 0] - data.qpos[0]
+    assert 0 < behind < speed**2 / (2 * FRICTION * G) + 3 * STEP * speed
+    assert data.qvel[0] == pytest.approx(speed, rel=0.01) and abs(data.qpos[1]) < 1e-9
+
+
+def test_a_turning_mocap_body_carries_a_cube_around():
+    model, data = simulated(BELT + free(CUBE, f".3 0 {ON_BELT}"))
+    with pressing(model, data) as contact:
+        for k in range(1, 1001):
+            data.mocap_quat[0] = math.cos(k * STEP / 2), 0, 0, math.sin(k * STEP / 2)
+            contact.step()
+    assert data.qvel[5] == pytest.approx(1, rel=1e-3)
+    assert math.hypot(*data.qpos[:2]) == pytest.approx(0.3, abs=1e-3)
+    assert math.atan2(data.qpos[1], data.qpos[0]) == pytest.approx(1, abs=0.05)
+
+
+def test_a_mocap_body_that_jumps_once_throws_nothing():
+    model, data = simulated(BELT + free(CUBE, f"0 0 {ON_BELT}"))
+    with pressing(model, data) as contact:
+        advance(contact, 0.05)
+        data.mocap_pos[0, 0] = 0.5
+        fastest = 0.0
+        for _ in range(50):
+            contact.step()
+            fastest = max(fastest, float(np.abs(data.qvel).max()))
+    assert fastest < 1e-9 and abs(data.qpos[0]) < 1e-12

@@ -15,6 +15,7 @@ from overlapper.simulation.layout import FARTHEST, Pose
 from overlapper.simulation.model import Array
 from overlapper.simulation.mujoco.friction import friction
 from overlapper.simulation.mujoco.geoms import collidable
+from overlapper.simulation.mujoco.mocap import COORDINATES, MocapMotion
 
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 NOT_IMPLICIT = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
@@ -28,12 +29,14 @@ class Step(Protocol):
     length: float
     wrenches: Array
     acceleration: Array
+    mocap: MocapMotion
 
 
 class MujocoDynamics:
     """See `Dynamics`: `links` are geoms (body, geom). Coordinates are MuJoCo's degrees of freedom, in its order.
 
-    MuJoCo's own mass matrix and motion axes are used. So armature, ball joints and several joints of a body count.
+    MuJoCo's own mass matrix and motion axes are used. So armature, ball joints and several joints of a body count. Six
+    coordinates of each mocap body follow, which forces do not move.
     """
 
     def __init__(self, stepping: Step, bodies: Sequence[int]) -> None:
@@ -47,17 +50,24 @@ class MujocoDynamics:
         self._trees = [slice(a, a + n) for a, n in zip(model.tree_dofadr.tolist(), model.tree_dofnum.tolist())]
         moved = [(k, dof) for k, (body, _) in enumerate(self.links) for dof in _moving(model, body)]
         trees = model.body_treeid[self._bodies]
-        self._move = trees >= 0  # the others stand still
-        self.solver = _core.ContactSolver.of_trees(
-            model.tree_dofnum, trees, np.array(moved, dtype=np.int64).reshape(-1, 2)
-        )
-        width = max((tree.stop - tree.start for tree in self._trees), default=0)
+        self._move = trees >= 0  # by forces
+        self._mocap = stepping.mocap
+        for k in np.flatnonzero(~self._move).tolist():
+            if (number := self._mocap.moving(int(self._bodies[k]))) is not None:
+                trees[k] = model.ntree + number
+                moved += [(k, coordinate) for coordinate in range(COORDINATES)]
+        of_mocap = [COORDINATES] * len(self._mocap.bodies)
+        self._still = np.zeros(sum(of_mocap))
+        coordinates = np.array([*model.tree_dofnum.tolist(), *of_mocap], dtype=np.int64)
+        self.solver = _core.ContactSolver.of_trees(coordinates, trees, np.array(moved, dtype=np.int64).reshape(-1, 2))
+        width = int(coordinates.max(initial=0))
         self._units = np.zeros((width, model.nv))  # row k has 1 at the k-th coordinate of each tree
         for tree in self._trees:
             self._units[range(tree.stop - tree.start), range(tree.start, tree.stop)] = 1
         self._later = mujoco.MjData(model)
         self._roots = model.body_rootid[model.dof_bodyid]
-        self.acceleration: Array = np.zeros(model.nv)  # without contacts, at the last `frames`
+        # Without contacts, at the last `frames`.
+        self.acceleration: Array = np.zeros(model.nv + len(self._still))
 
     def read(self) -> bool:
         return False  # `frames` reads all masses anyway
@@ -73,8 +83,14 @@ class MujocoDynamics:
         """The centres of mass of the links' bodies. Their orientations are not needed."""
         data = self._data
         inverse_mass = self._inverse_mass()
-        axes = data.cdof  # angular and linear, about the centre of mass of the tree
-        self.solver.move(axes[:, 3:], axes[:, :3], data.subtree_com[self._roots], inverse_mass)
+        axes, count = data.cdof, len(self._mocap.bodies)  # angular and linear, about the centre of mass of the tree
+        unit = np.tile(np.eye(COORDINATES), (count, 1))
+        self.solver.move(
+            np.concatenate([axes[:, 3:], unit[:, :3]]),
+            np.concatenate([axes[:, :3], unit[:, 3:]]),
+            np.concatenate([data.subtree_com[self._roots], self._mocap.centres.repeat(COORDINATES, axis=0)]),
+            np.concatenate([inverse_mass, np.zeros((len(unit), inverse_mass.shape[1]))]),
+        )
         return [(each, NO_TURN) for each in data.xipos[self._bodies].tolist()]
 
     def _inverse_mass(self) -> Array:
@@ -88,7 +104,8 @@ class MujocoDynamics:
         mujoco.mj_solveM(self._model, data, inverse, self._units)
         inverse = np.ascontiguousarray(inverse.T)
         told = self._stepping.acceleration
-        self.acceleration = np.where(np.abs(told) < FARTHEST, told, 0.0)  # MuJoCo resets data that diverges
+        # MuJoCo resets data that diverges.
+        self.acceleration = np.append(np.where(np.abs(told) < FARTHEST, told, 0.0), self._still)
         for tree in self._trees:
             if damping[tree].any():
                 own = inverse[tree, : tree.stop - tree.start]
@@ -107,13 +124,13 @@ class MujocoDynamics:
         return np.asarray(damping)
 
     def velocity(self) -> Array:
-        return np.array(self._data.qvel)
+        return np.append(self._data.qvel, self._mocap.velocity)
 
     def ahead(self, duration: float, velocity: Array) -> list[Pose]:
         data, later = self._data, self._later
         later.qpos[:] = data.qpos
-        later.mocap_pos[:], later.mocap_quat[:] = data.mocap_pos, data.mocap_quat
-        mujoco.mj_integratePos(self._model, later.qpos, velocity, duration)
+        self._mocap.move(later, duration)
+        mujoco.mj_integratePos(self._model, later.qpos, velocity[: self._model.nv], duration)
         mujoco.mj_kinematics(self._model, later)
         # MuJoCo's quaternions are wxyz.
         before, after = (each.xquat[self._bodies][:, [1, 2, 3, 0]] for each in (data, later))

@@ -16,6 +16,7 @@ from overlapper.simulation.model import Array, LinkKey
 from overlapper.simulation.mujoco.calls import stepped, unheard
 from overlapper.simulation.mujoco.dynamics import MujocoDynamics
 from overlapper.simulation.mujoco.geoms import collidable
+from overlapper.simulation.mujoco.mocap import MocapMotion
 from overlapper.simulation.mujoco.pair_rule import PairRule
 from overlapper.simulation.mujoco.silence import end_silence, silence, silenced
 
@@ -52,6 +53,8 @@ class MujocoStepping:
         self.length = float(model.opt.timestep)
         self.wrenches = np.zeros((model.nbody, 6))
         self.acceleration = np.zeros(model.nv)
+        self.mocap = MocapMotion(model, data)
+        self._begins = True  # the next substep is the first one of a time step
         self._answer: Callable[[], None] = _nothing
         self._sensors_told = False
         self._by_hand = False  # within a step that `prepare` and `step` make
@@ -124,6 +127,9 @@ class MujocoStepping:
         try:
             with silenced(self.model):
                 unheard("mj_step1")(self.model, self.data)
+                if self._begins:
+                    self.mocap.note()
+                    self._begins = False
                 self._accelerate()
         finally:
             self._by_hand = False
@@ -134,6 +140,7 @@ class MujocoStepping:
             return
         self._take()
         self.length = float(self.model.opt.timestep)
+        self.mocap.note()
         self._accelerate()
         self._answer()
         self._give()
@@ -153,7 +160,7 @@ class MujocoStepping:
             self._take()
 
     def stepped(self, duration: float) -> None:
-        return
+        self._begins = True
 
     def announce(self) -> None:
         stepped(self.data)
