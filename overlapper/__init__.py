@@ -16,11 +16,13 @@ from overlapper._core import (
     Placed,
     RoundedHull,
     Sphere,
+    TimeOfImpact,
     distance,
     iou,
     overlap,
     overlaps,
     penetration_depth,
+    time_of_impact,
 )
 from overlapper.face import lazily as _lazily
 from overlapper.functions import introspect as _introspect
@@ -53,12 +55,14 @@ __all__ = [
     "RoundedHull",
     "Shape",
     "Sphere",
+    "TimeOfImpact",
     "distance",
     "iou",
     "overlap",
     "overlaps",
     "penetration_depth",
     "random_polytope",
+    "time_of_impact",
 ]
 
 distance = _introspectable(distance)
@@ -66,6 +70,7 @@ iou = _introspectable(iou)
 overlap = _introspectable(overlap)
 overlaps = _introspectable(overlaps)
 penetration_depth = _introspectable(penetration_depth)
+time_of_impact = _introspectable(time_of_impact)
 for _kind in (
     Batch,
     Box,
@@ -79,6 +84,7 @@ for _kind in (
     Placed,
     RoundedHull,
     Sphere,
+    TimeOfImpact,
 ):
     _introspect(_kind)
 del _kind

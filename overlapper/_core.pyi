@@ -1426,3 +1426,103 @@ def explain_with(said_by: Callable[[Any, list[Any], dict[str, Any]], str]) -> No
     """
     Sets the function that says which argument is wrong, from what was called and its arguments.
     """
+
+class TimeOfImpact:
+    """The answer of `time_of_impact`. It is true unless `separated`."""
+
+    @property
+    def status(self) -> Literal['separated', 'impact', 'touching', 'overlapping', 'open']:
+        """
+        'separated': the bodies have no common point during the motion.
+        'impact': they are separated before `time` and overlap at `time_upper`.
+        'touching': they come so close that rounding decides whether they meet, or they overlap for a shorter time than the
+        tolerance, or they touch at the start.
+        'overlapping': they overlap at the start.
+        'open': the limit of steps was reached. They are separated before `time`; nothing is known after it.
+        """
+
+    @property
+    def time(self) -> float | None:
+        """s, not later than the first common point. None if separated."""
+
+    @property
+    def time_upper(self) -> float | None:
+        """
+        s, not earlier than the first common point of an impact. If touching, the time after which the pair is
+        certainly separated again, or the end of the motion. None if separated.
+        """
+
+    @property
+    def normal(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """(3,) unit vector from b to a at `time`. None if separated."""
+
+    @property
+    def point(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (3,) m, half-way between the nearest points at `time`; the centroid of the common set if overlapping. None if
+        separated.
+        """
+
+    @property
+    def distance(self) -> float:
+        """
+        m, the least distance of the computed poses: an upper bound of the least distance of the motion.
+        """
+
+    @property
+    def distance_time(self) -> float:
+        """s, when `distance` was seen."""
+
+    @property
+    def converged(self) -> bool:
+        """False if `time_upper - time` is longer than the tolerance."""
+
+    @property
+    def steps(self) -> int:
+        """Number of distances computed."""
+
+    def __bool__(self) -> bool: ...
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+def time_of_impact(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, motion_a: tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike] | Placed | None = None, motion_b: tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike] | Placed | None = None, duration: float = 1.0, tolerance: float = 1e-09) -> TimeOfImpact:
+    """
+    The time of the first common point of two moving shapes.
+
+    The position of each body moves along a line, and the body turns about its position. Both velocities are constant.
+
+    Parameters
+    ----------
+    a, b : shape, Placed, (n, 3) array_like or trimesh.Trimesh
+        The two bodies at time 0, as `distance` takes them.
+    motion_a, motion_b : tuple of two (3,) array_like, or Placed, optional
+        Linear velocity in m/s and angular velocity in rad/s, both in the world; or the body at the end of the motion. From
+        a Placed only the pose is read, and the body turns the shorter way. None: at rest.
+    duration : float, default 1.0
+        Length of the motion in s.
+    tolerance : float, default 1e-9
+        Wanted width of the interval of times, as a fraction of `duration`.
+
+    Returns
+    -------
+    TimeOfImpact
+        `time` is never later than the first common point. Rounding is included in this bound. No common point is a result,
+        not an error: `bool(result)` is False.
+
+    Raises
+    ------
+    ValueError
+        If both bodies are half-spaces, if `duration` is not positive, or if a motion is not finite.
+
+    Examples
+    --------
+    >>> from overlapper import Box, Placed, Sphere, time_of_impact
+    >>> bullet, sheet = Placed(Sphere(0.01), (0, 0, 1)), Box([1, 1, 0.0005])
+    >>> hit = time_of_impact(bullet, sheet, ((0, 0, -300), (0, 0, 0)), duration=0.01)
+    >>> hit.status, round(hit.time, 9)
+    ('impact', 0.003298333)
+    """

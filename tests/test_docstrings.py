@@ -81,7 +81,16 @@ def test_examples_of_a_docstring_show_what_comes_out(name):
 
 
 def test_every_function_and_shape_has_an_example_with_its_result():
-    functions = ["overlap", "distance", "penetration_depth", "iou", "random_polytope", "Batch", "Placed"]
+    functions = [
+        "overlap",
+        "distance",
+        "penetration_depth",
+        "iou",
+        "time_of_impact",
+        "random_polytope",
+        "Batch",
+        "Placed",
+    ]
     shapes = [kind.__name__ for kind in overlapper.Shape.__args__]
     assert {f"overlapper.{name}" for name in functions + shapes} <= {*WITH_EXAMPLES}
 

@@ -214,5 +214,6 @@ void define_poses(nb::module_& m);
 void define_shape_arrays(nb::module_& m);
 void define_forces(nb::module_& m);
 void define_function(nb::module_& m);
+void define_motion(nb::module_& m);
 
 }  // namespace overlapper::python

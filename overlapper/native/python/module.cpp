@@ -40,4 +40,5 @@ NB_MODULE(_core, m) {
   overlapper::python::define_shape_arrays(m);
   overlapper::python::define_forces(m);
   overlapper::python::define_function(m);
+  overlapper::python::define_motion(m);
 }

@@ -32,6 +32,7 @@ from overlapper import (
     overlaps,
     penetration_depth,
     random_polytope,
+    time_of_impact,
 )
 
 HANG = 120  # s after which something hangs; nothing here takes a tenth of it
@@ -89,6 +90,7 @@ def answers(seed):
         "distance": distance(a, b),
         "penetration_depth": penetration_depth(a, b),
         "iou": iou(a, b, TOLERANCE),
+        "time_of_impact": time_of_impact(a, b, (rng.normal(size=3), rng.normal(size=3))),
     }
     shapes, positions, orientations = zip(*((body.shape, body.position, body.orientation) for body in (a, b, c)))
     pairs = _core.candidate_pairs(shapes, positions, orientations)
@@ -128,6 +130,7 @@ def test_answers_cover_every_public_name():
         "Overlap",
         "Overlaps",
         "Shape",
+        "TimeOfImpact",
     }  # what functions return, and a typing alias
     assert {name for name, value in vars(_core).items() if not isinstance(value, type) and name[0] != "_"} <= {
         *used,

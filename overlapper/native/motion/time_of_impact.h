@@ -1,0 +1,37 @@
+#pragma once
+
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// The position moves along a line. The body turns about its position. Both velocities are constant in the world.
+struct Velocity {
+  Vec3 linear;   ///< m/s
+  Vec3 angular;  ///< rad/s
+};
+
+enum class Meeting {
+  kSeparated,    ///< no common point at any time of the motion
+  kImpact,       ///< separated before `time`, certainly overlapping at `time_upper`
+  kTouching,     ///< the gap is within rounding; an overlap may be shorter than the wanted width
+  kOverlapping,  ///< at the start
+  kOpen,         ///< the limit of steps was reached: separated before `time`, unknown after it
+};
+
+struct Impact {
+  Meeting status = Meeting::kOpen;
+  double time = 0;           ///< s: no common point before it
+  double time_upper = 0;     ///< s: the first common point is not later, if there is one
+  double distance = 0;       ///< m: the least distance seen
+  double distance_time = 0;  ///< s: when it was seen
+  Vec3 normal;               ///< unit, from b to a, at the last pose with a separating plane
+  Vec3 point;                ///< half-way between the nearest points of that pose
+  int steps = 0;             ///< distances computed
+};
+
+/// The first common point of two moving bodies within `duration`, by conservative advancement. `width`, in s, is the
+/// wanted width of the interval. Throws std::invalid_argument if both bodies are half-spaces.
+Impact time_of_impact(const Placed& a, const Placed& b, const Velocity& of_a, const Velocity& of_b, double duration,
+                      double width);
+
+}  // namespace overlapper
