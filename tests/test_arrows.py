@@ -21,7 +21,7 @@ lint_imports_command()
 """
 
 # The folders of the core from above down: a file may include those of its own and of lower ones.
-FLOORS = ["python", "batch", "overlap", "methods", "distance", "shapes", "forces", "geometry"]
+FLOORS = ["python", "batch", "motion", "overlap", "methods", "distance", "shapes", "forces", "geometry"]
 
 # The ways that know nothing of each other.
 APART = ["methods/clipping", "methods/tracing", "methods/dual"]

@@ -26,4 +26,4 @@ class SubstepsWarning(UserWarning):
 
 
 class NoStepWarning(UserWarning):
-    """No step was made within the `with` of a VolumetricContact, or it was not noticed."""
+    """Bodies have moved within the `with` of a VolumetricContact, which noticed no step."""

@@ -29,13 +29,11 @@ def resting(world, **options):
 # A block without a step
 
 
-def test_a_block_without_a_step_is_told_at_its_line(world):
+def test_a_block_that_asks_for_no_step_or_makes_one_or_fails_is_not_told(world):
     resting(world)
     contact = world.contact()
-    said = r"^VolumetricContact made no step within its `with`, so it has computed no forces$"
-    with pytest.warns(NoStepWarning, match=said) as caught, contact:
+    with contact:
         p.getNumBodies(world.client)
-    assert caught[0].filename == __file__
     with contact:
         contact.forces()  # a script that integrates by itself
     with contact:
@@ -48,14 +46,14 @@ def test_steps_by_a_name_that_was_imported_earlier_are_told(world):
     step = p.stepSimulation
     world.box(*[HALF] * 3, position=[0, 0, 1])
     said = r"although bodies have moved: a step is not noticed if its function was imported by name before, as in `from"
-    with pytest.warns(NoStepWarning, match=said), world.contact():
+    with pytest.warns(NoStepWarning, match=said) as caught, world.contact():
         step(world.client)
+    assert caught[0].filename == __file__
 
 
-def test_a_client_that_is_disconnected_within_the_block_has_made_no_step(client):
+def test_a_client_that_is_disconnected_within_the_block_is_not_told(client):
     box(client)
-    said = "so it has computed no forces$"
-    with pytest.warns(NoStepWarning, match=said), VolumetricContact(Bodies(client)):
+    with VolumetricContact(Bodies(client)):
         p.disconnect(client)
 
 

@@ -102,7 +102,7 @@ class VolumetricContact:
     of the same model have no contacts within the `with`, either. `data.xfrc_applied` keeps the forces of the script.
     After `step()`, `data` has the poses from before the last integration, as after mj_step.
 
-    A `with` block that ends without a step or `forces()` gives a NoStepWarning. It says if bodies have moved meanwhile.
+    A `with` block without a noticed step or `forces()` gives a NoStepWarning if bodies have moved meanwhile.
 
     A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning. The other bodies continue.
 
@@ -157,7 +157,7 @@ class VolumetricContact:
         self._inside = True
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None = None, *_: object) -> None:
         self._inside = False
         self._mechanics.leave()
         if kind is None and self._unasked:

@@ -86,22 +86,19 @@ class Told:
             )
 
     def of_no_step(self, positions: Array, orientations: Array) -> None:
-        """Warn of a `with` block without a step, at whose beginning the shapes were at these places."""
+        """Warn of a `with` block without a step, if shapes are no longer where they were at its beginning."""
         try:
             self._bodies.update()
         except ValueError:
-            moved = False  # the simulation has ended
-        else:
-            now = self._bodies.positions, self._bodies.orientations
-            moved = not all(map(np.array_equal, now, (positions, orientations)))
-        if moved:
-            why = (
-                "although bodies have moved: a step is not noticed if its function was imported by name before, "
-                "as in `from pybullet import stepSimulation`"
+            return  # the simulation has ended
+        now = self._bodies.positions, self._bodies.orientations
+        if not all(map(np.array_equal, now, (positions, orientations))):
+            warnings.warn(
+                "VolumetricContact made no step within its `with`, although bodies have moved: a step is not noticed if "
+                "its function was imported by name before, as in `from pybullet import stepSimulation`",
+                NoStepWarning,
+                stacklevel=3,
             )
-        else:
-            why = "so it has computed no forces"
-        warnings.warn(f"VolumetricContact made no step within its `with`, {why}", NoStepWarning, stacklevel=3)
 
     def _new(self, kind: type[Warning], contacts: Contacts, rows: NDArray[np.bool_]) -> Iterator[tuple[int, str, str]]:
         """Yield the rows whose pairs were not warned of yet, with the names of their links."""

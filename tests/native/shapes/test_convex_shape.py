@@ -12,7 +12,13 @@ NATIVE = ROOT / "overlapper" / "native"
 CONE = Path(__file__).with_name("cone.h")
 
 # Questions about two given kinds, and lanes that hold all sides of a box.
-MAY_ASK_FOR_A_KIND = {"distance/box_axes.cpp", "methods/clipping/wide_corners.cpp"}
+MAY_ASK_FOR_A_KIND = {
+    "batch/shape_array.cpp",
+    "distance/box_axes.cpp",
+    "methods/clipping/wide_corners.cpp",
+    "overlap/shape_gradient.cpp",
+    "python/shape_arrays.cpp",
+}
 
 # The concept does not ask for these. Their users do not compile without them: the class in Python, constructors.
 NOT_IN_THE_CONCEPT = re.compile(r"fields\(\)|make\(|^Cone\(|^double radius = 0")
