@@ -94,8 +94,8 @@ class Told:
         now = self._bodies.positions, self._bodies.orientations
         if not all(map(np.array_equal, now, (positions, orientations))):
             warnings.warn(
-                "VolumetricContact made no step within its `with`, although bodies have moved: a step is not noticed if "
-                "its function was imported by name before, as in `from pybullet import stepSimulation`",
+                "VolumetricContact made no step within its `with`, although bodies have moved: a step is not noticed "
+                "if its function was imported by name before, as in `from pybullet import stepSimulation`",
                 NoStepWarning,
                 stacklevel=3,
             )
