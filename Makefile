@@ -29,7 +29,7 @@ run: $(VENV)/run ## build, run SCENE=franka_grasp, write out/franka_grasp.csv an
 	@$(VENV)/bin/overlapper run $(SCENE) --out out/$(SCENE).csv --html out/$(SCENE).html
 
 test: $(VENV)/dev ## build, pass all tests except those of a Ray cluster
-	@echo "These tests take about 11 minutes on 2 processors. Tests of a Ray cluster are another target: make test-cluster"
+	@echo "These tests take 10 to 20 minutes on 2 processors. Tests of a Ray cluster are another target: make test-cluster"
 	@$(PYTEST) --numprocesses=auto --dist=worksteal $(CLUSTER:%=--ignore=%)
 
 test-cluster: $(VENV)/dev ## build, pass the tests of a Ray cluster of several nodes on this machine
