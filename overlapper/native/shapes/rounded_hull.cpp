@@ -337,7 +337,7 @@ class RoundedCutter {
     }
     begin_at_edge(e);
     const bool grazing = angle <= kGrazing && dot(normals[0], normals[1]) > 0;
-    if (!cutter_.empty()) cut_beyond(mitre, grazing ? kFartherIn : 1);
+    cut_beyond(mitre, grazing ? kFartherIn : 1);
     if (grazing) cut_beside(edge);
     cutter_.end();
   }
@@ -417,7 +417,7 @@ class RoundedCutter {
     const Mitre mitre = mitre_at(hull_.vertices[beside[0].vertex], shared_->normals);
     if (!reached(mitre) || !reaches_vertex(beside)) return;
     begin_at_vertex(beside);
-    if (!cutter_.empty()) cut_beyond(mitre, kFartherIn);
+    cut_beyond(mitre, kFartherIn);
     cutter_.end();
   }
 
@@ -439,8 +439,10 @@ class RoundedCutter {
   }
 
   /// The part of the mitred polytope over an edge or a vertex and outside the round lies beyond a plane. A direction
-  /// from the point to there is a sum of the facets' normals. If it is no shorter than the radius, it reaches at least
-  /// as far along `towards` as the least of these normals times the radius.
+  /// from the point to there is a sum of the facets' normals with positive factors. The direction is no shorter than
+  /// the radius, so the factors add up to at least the radius. Along `towards`, each normal reaches at least as far as
+  /// `least`. If that is positive, the direction reaches at least as far as `least` times the radius. If not, there is
+  /// no such plane.
   struct Mitre {
     Vec3 point, towards;
     double least;
@@ -454,11 +456,13 @@ class RoundedCutter {
     return {point, towards, least};
   }
   bool reached(const Mitre& mitre) const {
-    return cutter_.heights({mitre.towards, dot(mitre.towards, mitre.point)}).second >= mitre.least * radius_;
+    return !(mitre.least > 0) ||
+           cutter_.heights({mitre.towards, dot(mitre.towards, mitre.point)}).second >= mitre.least * radius_;
   }
   /// A plane farther in does not touch the round where the polytope does.
   static constexpr double kFartherIn = 0.98;
   void cut_beyond(const Mitre& mitre, double part) {
+    if (!(mitre.least > 0) || cutter_.empty()) return;
     const WideVector inwards = wide(-mitre.towards);
     cutter_.cut({inwards, dot(inwards, wide(mitre.point)) - DoubleDouble{part * mitre.least * radius_}});
   }

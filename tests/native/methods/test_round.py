@@ -421,6 +421,23 @@ def test_coinciding_shapes_are_measured_correctly():
         assert abs(exactly.volume - nearly.volume) <= error
 
 
+def test_a_vertex_with_many_facets_on_one_side_shares_with_a_box_what_its_halves_do():
+    # One facet's normal is more than a right angle away from the mean of all.
+    fan = [(np.cos(t), np.sin(t), -0.7963531344922321) for t in np.linspace(-0.7286, 0.7286, 19)]
+    rounded = Placed(RoundedHull(np.array([(0, 0, 0), *fan, (-0.18071397380646537, 0, -1.45838456543)]) / 2, 0.0467))
+    turned = np.array([1.46387087, 1.25255986, -0.50703985, -1.34518593])
+    for centre, size in (
+        ((-0.00916795, 0.04061619, -0.01420654), 0.04656708),
+        ((-0.00333569, 0.0161665, -0.0094886), 0.0418),
+    ):
+        along = rotation(turned) @ [0, 0, size / 2]
+        halves = [
+            overlap(rounded, Placed(Box([size, size, size / 2]), centre + side * along, turned)) for side in (-1, 1)
+        ]
+        whole = overlap(rounded, Placed(Box([size] * 3), centre, turned))
+        assert whole.volume == pytest.approx(sum(half.volume for half in halves), rel=EXACT)
+
+
 @pytest.mark.parametrize("depth", [0.3, 1e-2, 1e-4, 1e-7])
 @pytest.mark.parametrize("margin", [0.5, 1e-3])
 def test_a_rounded_hull_of_many_facets_shares_with_a_box_what_its_halves_do(depth, margin):
