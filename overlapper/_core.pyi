@@ -1501,7 +1501,8 @@ def time_of_impact(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | Rou
         The two bodies at time 0, as `distance` takes them.
     motion_a, motion_b : tuple of two (3,) array_like, or Placed, optional
         Linear velocity in m/s and angular velocity in rad/s, both in the world; or the body at the end of the motion. From
-        a Placed only the pose is read, and the body turns the shorter way. None: at rest.
+        a Placed only the pose is read, and the body turns the shorter way. Its velocities are rounded, so the end is
+        reached up to rounding. None: at rest.
     duration : float, default 1.0
         Length of the motion in s.
     tolerance : float, default 1e-9

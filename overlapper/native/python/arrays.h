@@ -202,6 +202,9 @@ std::string any_solid();
 Placed to_placed(nb::handle value, const std::string& name);
 /// "auto" or "paper".
 Method to_method(nb::handle value);
+/// A tolerance between 0 and 1.
+double to_tolerance(nb::handle given);
+
 /// A number of threads; None stands for one per processor.
 int to_threads(nb::handle given);
 /// A number as printed in a repr.

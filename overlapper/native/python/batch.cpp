@@ -417,6 +417,12 @@ Examples
 
 }  // namespace
 
+double to_tolerance(nb::handle given) {
+  const double tolerance = to_double(given, "tolerance");
+  if (!(tolerance > 0 && tolerance < 1)) fail("tolerance", "must be greater than 0 and less than 1");
+  return tolerance;
+}
+
 int to_threads(nb::handle given) {
   if (given.is_none()) return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   int threads = 0;

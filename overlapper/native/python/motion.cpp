@@ -72,9 +72,8 @@ Velocity to_velocity(nb::handle value, const Placed& body, double duration, cons
 TimeOfImpact find(nb::handle a_given, nb::handle b_given, nb::handle motion_a, nb::handle motion_b,
                   nb::handle duration_given, nb::handle tolerance_given) {
   const Placed a = to_placed(a_given, "a"), b = to_placed(b_given, "b");
-  const double duration = to_double(duration_given, "duration"), tolerance = to_double(tolerance_given, "tolerance");
+  const double duration = to_double(duration_given, "duration"), tolerance = to_tolerance(tolerance_given);
   if (!(duration > 0 && duration < 1e25)) fail("duration", "must be greater than 0 and less than 1e25 s");
-  if (!(tolerance > 0 && tolerance < 1)) fail("tolerance", "must be greater than 0 and less than 1");
   const Velocity of_a = to_velocity(motion_a, a, duration, "motion_a"),
                  of_b = to_velocity(motion_b, b, duration, "motion_b");
   const double width = tolerance * duration;
@@ -146,7 +145,8 @@ a, b : shape, Placed, (n, 3) array_like or trimesh.Trimesh
     The two bodies at time 0, as `distance` takes them.
 motion_a, motion_b : tuple of two (3,) array_like, or Placed, optional
     Linear velocity in m/s and angular velocity in rad/s, both in the world; or the body at the end of the motion. From
-    a Placed only the pose is read, and the body turns the shorter way. None: at rest.
+    a Placed only the pose is read, and the body turns the shorter way. Its velocities are rounded, so the end is
+    reached up to rounding. None: at rest.
 duration : float, default 1.0
     Length of the motion in s.
 tolerance : float, default 1e-9

@@ -206,12 +206,6 @@ void uninterrupted(const Work& work) {
   if (!finished) throw nb::python_error();
 }
 
-double to_tolerance(nb::handle given) {
-  const double tolerance = to_double(given, "tolerance");
-  if (!(tolerance > 0 && tolerance < 1)) fail("tolerance", "must be greater than 0 and less than 1");
-  return tolerance;
-}
-
 /// A number for each pair: (n,) for aligned rows, otherwise (n, m).
 nb::object values_of_pairs(const ShapeArray& a, const ShapeArray& b, bool aligned, bool culled, int threads,
                            const PairValue& value) {
