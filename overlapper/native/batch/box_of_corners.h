@@ -27,10 +27,10 @@ inline constexpr BoxCorners kUnitCorners{{{-0.5, -0.5, -0.5},
                                           {0.5, 0.5, 0.5},
                                           {-0.5, 0.5, 0.5}}};
 
-/// The box of eight corners. The centre is the mean of the corners, a size is the length of the mean of four edges, and
-/// the axes are the rotation nearest to the directions of these means. Corners in the order of pytorch3d are taken at
-/// once. Other orders are tried if a corner is farther off than `within`. All sizes are positive only for corners of
-/// some volume.
+/// The box of eight corners. The centre is the mean of the corners. A size is the length of the mean of four edges. The
+/// axes are the rotation nearest to the directions of these means. Corners in the order of pytorch3d are taken at once.
+/// Other orders are tried if a corner is farther off than `within`. All sizes are positive only for corners of some
+/// volume.
 FittedBox box_of_corners(const BoxCorners& given, double within);
 
 }  // namespace overlapper

@@ -37,8 +37,8 @@ using PairValue = std::function<double(const Placed& a, const Placed& b)>;
 bool for_pairs(const ShapeArray& a, const ShapeArray& b, Pairing pairing, bool culled, int threads,
                const PairValue& value, std::span<double> values);
 
-/// The derivatives of a weighted sum of common volumes by the numbers of one row: of its shape, as shape_gradient(), of
-/// its position, and of a rotation vector about its position.
+/// The derivatives of a weighted sum of common volumes by the numbers of one row. These are the numbers of its shape,
+/// as in shape_gradient(), its position, and a rotation vector about its position.
 struct RowGradient {
   Vec3 shape, position, rotation;
 };

@@ -71,9 +71,9 @@ struct Mover {
 
 /// The gap between two bodies along a direction that turns with `turning`, as a lower bound by the time from now.
 ///
-/// For each pair of points of the cores, the distance along the direction has a first derivative that is linear in the
-/// points, and a second derivative of at most `curvature`. The bound is the least of these parabolas, so it is concave.
-/// A concave function that is positive at two times is positive between them.
+/// Each pair of points of the cores has a distance along the direction. Its first derivative is linear in the points.
+/// Its second derivative is at most `curvature`. The bound is the least of these parabolas, so it is concave. A concave
+/// function that is positive at two times is positive between them.
 struct Gap {
   const Mover &a, &b;
   Vec3 normal, turn_a, turn_b;
