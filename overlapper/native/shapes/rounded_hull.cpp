@@ -285,7 +285,7 @@ class RoundedCutter {
 
   using Vertex = std::span<const SharedPlanes::Beside>;
 
-  void cut_along_edges(void (RoundedCutter::*cut_edge)(int), void (RoundedCutter::*cut_vertex)(Vertex)) {
+  void cut_along_edges(void (RoundedCutter::*at_edge)(int), void (RoundedCutter::*at_vertex)(Vertex)) {
     for (int e = 0; e < static_cast<int>(hull_.edges.size()); ++e) {
       cancellation_point();
       const Edge& edge = hull_.edges[e];
@@ -295,13 +295,13 @@ class RoundedCutter {
         if (shared_->raised[both[i]] && near(std::span(both).subspan(i, 1)))
           shared_->beside.push_back({both[i], both[1 - i], e});
       // Each direction between two normals points away from one of the two facets.
-      if (raised(edge.left) || raised(edge.right)) (this->*cut_edge)(e);
+      if (raised(edge.left) || raised(edge.right)) (this->*at_edge)(e);
     }
     std::vector<SharedPlanes::Beside>& all = shared_->beside;
     std::ranges::sort(all, {}, [](const SharedPlanes::Beside& b) { return std::pair(b.vertex, b.other); });
     for (size_t i = 0, end; i < all.size(); i = end) {
       for (end = i + 1; end < all.size() && all[end].vertex == all[i].vertex;) ++end;
-      (this->*cut_vertex)(std::span(all).subspan(i, end - i));
+      (this->*at_vertex)(std::span(all).subspan(i, end - i));
     }
   }
 
