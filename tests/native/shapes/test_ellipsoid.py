@@ -335,17 +335,6 @@ def test_the_common_part_of_nested_bodies_is_the_smaller_body():
         assert abs(found.volume - small.volume) <= found.volume_error <= 2e-3 * small.volume
 
 
-@pytest.mark.parametrize("kind", ["capsule", "cylinder", "rounded hull"])
-def test_round_bodies_are_enclosed_as_closely_as_is_asked(kind):
-    rng = np.random.default_rng(3)
-    a, b = sink(somewhere(rng, slender(rng, 4)), somewhere(rng, OTHERS[kind](rng)), 0.2)
-    coarse, fine = (overlap(a, b, tolerance=t) for t in (1e-2, 1e-3))
-    assert coarse.way == fine.way == "dual hull"
-    assert coarse.converged and fine.converged
-    assert abs(coarse.volume - fine.volume) <= coarse.volume_error + fine.volume_error
-    assert fine.volume_error <= 1e-3 * fine.volume
-
-
 # ------------------------------------------------------------------------------------------- depth, distance, witnesses
 
 

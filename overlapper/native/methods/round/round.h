@@ -29,7 +29,7 @@ struct RoundChoice {
 
 /// How pairs with a round body are measured by Way::kClosedForm and Way::kSlicing. The first line that fits counts.
 /// Forms after the last one are null.
-inline constexpr std::array<RoundChoice, 12> kRoundChoices{{
+inline constexpr std::array<RoundChoice, 13> kRoundChoices{{
     {"two balls", [](const RoundTraits& t) { return t.balls == 2; }, {closed_forms::lens}, pieces::measure_pieces},
     {"two, each a ball or a capsule",
      [](const RoundTraits& t) { return t.balls + t.capsules == 2; },
@@ -67,6 +67,10 @@ inline constexpr std::array<RoundChoice, 12> kRoundChoices{{
      [](const RoundTraits& t) { return t.stretched > 0 && t.stretched + t.balls == 2; },
      {},
      lenses::measure_lenses},
+    {"an ellipsoid, and a capsule, a cylinder or a rounded hull",
+     [](const RoundTraits& t) { return t.stretched == 1 && t.capsules + t.cylinders + t.rounded_hulls == 1; },
+     {},
+     pieces::measure_stretched_in_parts},
     {"a rounded hull, and no ellipsoid",
      [](const RoundTraits& t) { return t.rounded_hulls > 0 && t.stretched == 0; },
      {},

@@ -4,6 +4,8 @@
 #include <cfloat>
 #include <utility>
 
+#include "geometry/constants.h"
+
 namespace overlapper::lenses {
 namespace {
 
@@ -51,6 +53,8 @@ Principal principal(const Mat3& k) {
     for (const auto& [p, q] : {std::pair{0, 1}, {0, 2}, {1, 2}}) {
       const double both = overlapper::dot(column[p], column[q]), of_p = norm2(column[p]), of_q = norm2(column[q]);
       if (!(std::abs(both) > 0x1p-52 * std::sqrt(of_p * of_q))) continue;
+      // The column along the axis of an endless cylinder is only rounding.
+      if (std::min(of_p, of_q) < 0x1p-100 * std::max(of_p, of_q)) continue;
       turned = true;
       const double half = (of_q - of_p) / (2 * both);
       const double tangent = std::copysign(1 / (std::abs(half) + std::sqrt(half * half + 1)), half);
@@ -115,24 +119,54 @@ Axes settled_axes(Vec3 normal, const WideMatrix& k) {
   return axes;
 }
 
-/// The values of t, on either side of the inner point, where a radius vanishes. `square` is positive at zero and
-/// concave.
+/// The values of t where a radius vanishes. `square` is concave.
 std::array<double, 2> ends_of(const Quadratic& square) {
-  const double half = square[1] / 2, bend = -square[2], root = std::sqrt(half * half + bend * square[0]);
+  const double half = square[1] / 2, bend = -square[2], under_root = half * half + bend * square[0];
+  if (!(under_root > 0)) return {kInfinity, -kInfinity};
+  const double root = std::sqrt(under_root);
   if (half > 0) return {-square[0] / (half + root), (half + root) / bend};
   return {(half - root) / bend, square[0] / (root - half)};
+}
+
+/// Up to this sine of the angle between a wall and the slices, the wall ends them.
+constexpr double kParallel = 0x1p-46;
+
+void add_wall(const Wall& wall, const Axes& axes, Flat lean, Discs& result) {
+  const DoubleDouble x = overlapper::dot(wall.normal, wide(axes.x)), y = overlapper::dot(wall.normal, wide(axes.y)),
+                     n = overlapper::dot(wall.normal, wide(axes.n));
+  const DoubleDouble rate = n + (DoubleDouble{lean.x} * x + DoubleDouble{lean.y} * y);
+  Cut cut{{x.head, y.head}, std::hypot(x.head, y.head), wall.slack.head, rate.head, n.head, wall.face, wall.slack.tail,
+          rate.tail};
+  if (cut.length > kParallel) {
+    result.cut[result.cuts++] = cut;
+    return;
+  }
+  cut.rate = n.head;
+  std::optional<Cut>& end = result.end[n.head > 0];
+  if (!end || (cut.offset / n.head - end->offset / end->rate) * n.head < 0) end = cut;
 }
 
 }  // namespace
 
 std::array<double, 4> Discs::ends() const {
-  const auto a = ends_of(first_square), b = ends_of(second_square);
+  const auto a = ends_of(first_square);
+  const auto b = cylinder ? std::array{-kInfinity, kInfinity} : ends_of(second_square);
   return {a[0], a[1], b[0], b[1]};
+}
+
+Vec3 Discs::moment(const Mat3& moved, const quadric::Stretch& stretch) const {
+  const Mat3 axes = transposed({normal, x, y}), w = axes * moved * transposed(axes);
+  const Vec3 h = stretch.half_axes, c = stretch.cofactors;
+  return {h.y * c.z * w.row1.z - h.z * c.y * w.row2.y, h.z * c.x * w.row2.x - h.x * c.z * w.row0.z,
+          h.x * c.y * w.row0.y - h.y * c.x * w.row1.x};
 }
 
 std::array<double, 2> Discs::range() const {
   const auto [a_low, a_high, b_low, b_high] = ends();
-  return {std::max(a_low, b_low), std::min(a_high, b_high)};
+  std::array<double, 2> found{std::max(a_low, b_low), std::min(a_high, b_high)};
+  if (end[0]) found[0] = std::max(found[0], end[0]->offset / end[0]->rate);
+  if (end[1]) found[1] = std::min(found[1], end[1]->offset / end[1]->rate);
+  return found;
 }
 
 /// If the middle value is above the geometric mean of the others, the largest value is nearer to it than the smallest
@@ -162,22 +196,30 @@ bool better_first(const StretchedBall& first, const StretchedBall& second) {
 }
 
 std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& second) {
-  const WideVector inverse_first = inverse(first.half_axes), inverse_second = inverse(second.half_axes);
+  const WideVector inverse_second = inverse(second.half_axes);
   // A ball has any axes; those of the other body make K diagonal.
   const WideMatrix &rotation = first.ball ? second.rotation : first.rotation,
                    &rotation_of_second = second.ball ? first.rotation : second.rotation;
-  const WideVector c = scaled_by(inverse_first, apply_transposed(rotation, first.centre));
   const WideVector k_centre = scaled_by(inverse_second, apply_transposed(rotation_of_second, second.centre));
+  if (!(overlapper::dot(k_centre, k_centre).head < 1)) return std::nullopt;
+  const WideVector c = scaled_by(inverse(first.half_axes), apply_transposed(rotation, first.centre));
+  std::optional<Discs> result = discs(c, SecondBall{between_balls(first, second, inverse_second), k_centre}, {});
+  if (result) result->first_rotation = rotation;
+  return result;
+}
+
+std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::span<const Wall> walls) {
+  const WideMatrix& k = second.k;
+  const WideVector& k_centre = second.middle;
   const DoubleDouble one{1}, slack_first = one - overlapper::dot(c, c),
                              slack_second = one - overlapper::dot(k_centre, k_centre);
-  if (!(slack_first.head > 0 && slack_second.head > 0)) return std::nullopt;
-  const WideMatrix k = between_balls(first, second, inverse_second);
+  if (!(slack_first.head > 0) || walls.size() > kMostCuts) return std::nullopt;
   const Mat3 plain = rounded(k);
   const Vec3 contact = rounded(c);
   const Axes axes = settled_axes(across_slices(principal(plain), contact), k);
 
   Discs result;
-  result.normal = axes.n, result.x = axes.x, result.y = axes.y, result.first_rotation = rotation;
+  result.normal = axes.n, result.x = axes.x, result.y = axes.y;
   result.oval = axes.oval();
   result.second_ball = plain, result.second_middle = rounded(k_centre);
   const DoubleDouble value = (axes.xx + axes.yy) / DoubleDouble{2}, round = one / value;
@@ -211,6 +253,7 @@ std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& seco
   for (int i = 0; i < 3; ++i) {
     result.slack[i] = (rest * of_first[i] + part * of_other[i]).head;
     result.difference[i] = (of_first[i] - of_other[i]).head;
+    result.first_slack[i] = of_first[i].head, result.second_slack[i] = of_other[i].head;
   }
   result.first_square = {(slack_first + c_x * c_x + c_y * c_y).head, 2 * c_n.head, -1};
   const DoubleDouble p_x = round * overlapper::dot(axes.along_n, axes.along_x),
@@ -225,6 +268,9 @@ std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& seco
       (of_other[0] + dot_in_section(g_x, g_y, g_x, g_y)).head, 2 * (g_n - dot_in_section(g_x, g_y, p_x, p_y)).head,
       (dot_in_section(p_x, p_y, p_x, p_y) - round * overlapper::dot(axes.along_n, axes.along_n)).head};
   result.second_rise = std::sqrt(-result.second_square[2] * value.head);
+  result.cylinder = second.cylinder;
+  if (second.cylinder) result.second_square = {round.head, 0, 0}, result.second_rise = 0;
+  for (const Wall& wall : walls) add_wall(wall, axes, lean, result);
   return result;
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <optional>
+#include <span>
 
 #include "geometry/wide_pose.h"
 #include "methods/round/quadric/stretch.h"
@@ -51,12 +53,43 @@ struct StretchedBall {
   bool ball;
 };
 
-/// Two ellipsoids in parallel slices in which both are discs.
+/// { y : |K y − k| <= 1 } in the coordinates of an ellipsoid: a ball or an ellipsoid, or an endless cylinder. The last
+/// row of a cylinder's K is zero.
+struct SecondBall {
+  WideMatrix k;
+  WideVector middle;
+  bool cylinder = false;
+};
+
+/// A plane that cuts the second body: { y : normal · y <= slack } about the inner point.
+struct Wall {
+  WideVector normal;  ///< unit
+  DoubleDouble slack;
+  bool face;  ///< a face of the second body, not a cut between two parts of it
+};
+
+/// A wall in the slices: normal · p <= offset − rate t, with p about the foot. A wall parallel to the slices ends them.
+struct Cut {
+  Flat normal;
+  double length, offset, rate;
+  double across;  ///< the component of the unit normal across the slices
+  bool face;
+  double offset_tail = 0, rate_tail = 0;  ///< what doubles cannot hold
+  /// A wall nearly parallel to the slices crosses them within a short interval. There, the tail of t counts.
+  double side(double t, double tail = 0) const {
+    return std::fma(-rate, t, offset) + (offset_tail - rate_tail * t - rate * tail);
+  }
+};
+
+/// The largest number of walls of a part of a body.
+inline constexpr int kMostCuts = 24;
+
+/// An ellipsoid and a second body, in parallel slices in which both are discs. Walls may cut the second body.
 ///
 /// Coordinates are those of the first ellipsoid, along its axes, in units of its half axes: there it is a unit ball.
 /// They count from the inner point. The other is { y : |K y − k| <= 1 }. For the principal values l0 <= l1 <= l2 of
 /// KᵀK along u0, u1, u2, its section by every plane orthogonal to √(l1 − l0) u0 ± √(l2 − l1) u2 is a disc: that plane
-/// contains u1, and the plane's other direction has the same value.
+/// contains u1, and the plane's other direction has the same value. For an endless cylinder, l0 is zero.
 ///
 /// In a slice, places count from a foot that moves with t along a tangent of the contact. Then everything that
 /// describes a shallow contact is small, found in double-double, and rounded once: the slacks of both discs at the
@@ -70,14 +103,24 @@ struct Discs {
   Quadratic slack;                        ///< of that weighted mean
   Quadratic difference;                   ///< slack of the first less that of the second
   Quadratic first_square, second_square;  ///< of the radii
-  double first_level;                     ///< t of the first body's centre
-  double oval;                            ///< relative deviation of the second body's sections from discs
-  double second_rise;                     ///< height in the second's own ball per t
-  double misplaced = 0;                   ///< error of slacks by double-doubles, in units of the last bit
-  Mat3 second_ball;                       ///< K
-  Vec3 second_middle;                     ///< k
+  Quadratic first_slack, second_slack;
+  double first_level;    ///< t of the first body's centre
+  double oval;           ///< relative deviation of the second body's sections from discs
+  double second_rise;    ///< height in the second's own ball per t
+  double misplaced = 0;  ///< error of slacks by double-doubles, in units of the last bit
+  Mat3 second_ball;      ///< K
+  Vec3 second_middle;    ///< k
   WideMatrix first_rotation;
+  bool cylinder = false;   ///< the second body is an endless cylinder
+  double second_area = 0;  ///< m² of the second surface per angle and t, if that is constant
+  std::array<Cut, kMostCuts> cut;
+  int cuts = 0;
+  std::array<std::optional<Cut>, 2> end;  ///< walls parallel to the slices, at the low and at the high end
 
+  /// A vector across the slices and in their plane, along the axes of the first body.
+  Vec3 along_axes(Vec3 v) const { return v.x * normal + v.y * x + v.z * y; }
+  /// ∫ x × n dA of the stretched ball's surface along its axes, from ∫ y Nᵀ dA of the ball in the slices' axes.
+  Vec3 moment(const Mat3& moved, const quadric::Stretch& stretch) const;
   Line first_centre() const { return {centre.start - share * apart.start, centre.slope - share * apart.slope}; }
   Line second_centre() const {
     return {centre.start + (1 - share) * apart.start, centre.slope + (1 - share) * apart.slope};
@@ -90,6 +133,10 @@ struct Discs {
 
 /// No value if the inner point is not inside both.
 std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& second);
+
+/// The same for a first body that is the unit ball about `centre`. No value if the inner point is not inside it, or if
+/// there are too many walls. The point may be outside the second body.
+std::optional<Discs> discs(const WideVector& centre, const SecondBall& second, std::span<const Wall> walls);
 
 /// Whether sections are closer to discs, relative to rounding, if `first` becomes the ball.
 bool better_first(const StretchedBall& first, const StretchedBall& second);

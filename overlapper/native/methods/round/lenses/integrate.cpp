@@ -14,19 +14,20 @@ using slicing::Rule;
 using slicing::Series;
 
 /// If the relative error of a rule is not larger, no finer rule follows.
-constexpr double kVolumeError = 2e-15, kAreaError = 1e-11;
+constexpr double kVolumeError = 2e-15, kAreaError = 1e-11, kBorderError = 1e-11;
 constexpr int kMostHalvings = 40;
 constexpr int kMostRules = 400;
 
 struct Part {
   double low, high;
   Sums sums;
-  Series volume, area;
+  Series volume, area, border;
 };
 
 class Integrating {
  public:
-  Integrating(const Discs& discs, const Wanted& wanted) : discs_(discs), wanted_(wanted) {}
+  Integrating(const Discs& discs, const Wanted& wanted)
+      : discs_(discs), wanted_(wanted), volume_(wanted.volume), border_(wanted.border) {}
 
   Integral run() {
     const Changes at = changes(discs_);
@@ -36,24 +37,35 @@ class Integrating {
       if (!(at.t[i] < at.t[i + 1])) continue;
       const double middle = at.t[i] / 2 + at.t[i + 1] / 2;
       if (section(discs_, middle).outline == Outline::kNothing) continue;
+      if (discs_.cuts > 0 && !(slice(discs_, middle, {}).moments.volume > 0)) continue;
       parts[count++] = apply(at.t[i], at.t[i + 1], slicing::kNodes24);
     }
     for (int i = 0; i < count; ++i)
-      volume_ += parts[i].sums.moments.volume, area_ += parts[i].sums.first_area + parts[i].sums.second_area;
+      volume_ += parts[i].sums.moments.volume, border_ += parts[i].sums.border,
+          area_ += parts[i].sums.first_area + parts[i].sums.second_area;
     for (int i = 0; i < count; ++i) add(parts[i], true, 0);
+    for (const bool high : {false, true}) {
+      const std::optional<Cut>& end = discs_.end[high];
+      const double t = at.count > 0 ? at.t[high ? at.count - 1 : 0] : 0;
+      if (end && at.count > 0 && t == end->offset / end->rate)
+        add_end(discs_, *end, slice(discs_, t, {}).moments.volume, wanted_, result_.sums);
+    }
     return result_;
   }
 
  private:
   Part apply(double low, double high, Rule rule) {
-    Part part{low, high, {}, {}, {}};
+    Part part{low, high, {}, {}, {}, {}};
     ++rules_;
     const double width = high - low;
     for (const slicing::Node& node : rule) {
       const double step = width * node.share, weight = width * node.weight, sine = width * node.sine;
-      const Sums below = slice(discs_, low + step, wanted_), above = slice(discs_, high - step, wanted_);
+      const double near = low + step, far = high - step;
+      const Sums below = slice(discs_, near, wanted_, step - (near - low)),
+                 above = slice(discs_, far, wanted_, (high - far) - step);
       part.sums.add(weight, below), part.sums.add(weight, above);
       part.volume.add(node, sine * below.moments.volume, sine * above.moments.volume);
+      if (wanted_.closing) part.border.add(node, sine * below.border, sine * above.border);
       if (wanted_.first)
         part.area.add(node, sine * (below.first_area + below.second_area),
                       sine * (above.first_area + above.second_area));
@@ -73,6 +85,9 @@ class Integrating {
   bool enough(const Part& part) const {
     const double small = std::max(kVolumeError * volume_, 4 * DBL_EPSILON * part.sums.blur);
     if (error_of(part.volume) > small && part.volume.tail() > 16 * DBL_EPSILON * part.sums.moments.volume) return false;
+    if (wanted_.closing && part.border.stretched_error(part.sums.border) > kBorderError * border_ &&
+        part.border.tail() > 64 * DBL_EPSILON * part.sums.border)
+      return false;
     return !wanted_.first ||
            part.area.stretched_error(part.sums.first_area + part.sums.second_area) <= kAreaError * area_;
   }
@@ -95,7 +110,7 @@ class Integrating {
 
   const Discs& discs_;
   const Wanted& wanted_;
-  double volume_ = 0, area_ = 0;
+  double volume_, border_, area_ = 0;
   int rules_ = 0;
   Integral result_;
 };

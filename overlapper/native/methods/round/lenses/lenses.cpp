@@ -13,9 +13,6 @@ namespace {
 using pieces::RoundMeasures;
 using pieces::SlicedPair;
 
-/// The rounding of all terms of a slack, and of all sums of slices, in units of the last bit.
-constexpr double kRoundings = 16;
-
 StretchedBall stretched_ball(const Placed& body, const SlicedPair& pair) {
   const Ellipsoid* ellipsoid = stretched(body.shape);
   const double radius = ellipsoid ? 0 : revolution(body.shape)->radius;
@@ -44,24 +41,14 @@ struct ToWorld {
   quadric::Stretch stretch;
   Mat3 turn;
 
-  /// A vector across the slices and in their plane, along the axes of the first body.
-  Vec3 along_axes(Vec3 v) const { return v.x * discs.normal + v.y * discs.x + v.z * discs.y; }
-  Vec3 point(Vec3 v) const { return turn * scaled(stretch.half_axes, along_axes(v)); }
-  Vec3 area_vector(Vec3 v) const { return turn * stretch.normal(along_axes(v)); }
+  Vec3 point(Vec3 v) const { return turn * scaled(stretch.half_axes, discs.along_axes(v)); }
+  Vec3 area_vector(Vec3 v) const { return turn * stretch.normal(discs.along_axes(v)); }
   Moments moments(const Moments& m) const {
     const Moments own = m.along({discs.normal, discs.x, discs.y});
     const Vec3 h = stretch.half_axes;
     return {stretch.volume * own.volume, stretch.volume * scaled(h, own.first),
             stretch.volume * scaled(scaled(h, h), own.squares),
             stretch.volume * scaled(stretch.cofactors, own.products)};
-  }
-  /// ∫ x × n dA, from ∫ y Nᵀ dA.
-  Vec3 moment(const Mat3& moved) const {
-    const Mat3 axes = transposed({discs.normal, discs.x, discs.y});
-    const Mat3 w = axes * moved * transposed(axes);
-    const Vec3 h = stretch.half_axes, c = stretch.cofactors;
-    return turn * Vec3{h.y * c.z * w.row1.z - h.z * c.y * w.row2.y, h.z * c.x * w.row2.x - h.x * c.z * w.row0.z,
-                       h.x * c.y * w.row0.y - h.y * c.x * w.row1.x};
   }
 };
 
@@ -111,7 +98,8 @@ std::optional<RoundMeasures> measure_lenses(const SlicedPair& pair) {
   result.inertia_error = 64 * DBL_EPSILON * to.stretch.volume * longest * longest * (squares.x + squares.y + squares.z);
   result.rounding = least * (kRoundings * DBL_EPSILON + 2 * found->oval) * sums.terms;
   const double side = swapped ? -1 : 1;
-  result.pull = about({side * to.area_vector(sums.force), side * to.moment(sums.moved)}, rounded(pair.inside), {});
+  result.pull = about({side * to.area_vector(sums.force), side * (to.turn * found->moment(sums.moved, to.stretch))},
+                      rounded(pair.inside), {});
   result.area_known = pair.with_area;
   if (pair.with_area) {
     result.area = sums.first_area + sums.second_area;

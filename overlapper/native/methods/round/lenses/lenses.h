@@ -1,8 +1,11 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
+#include "methods/round/lenses/sums.h"
 #include "methods/round/pieces/measure.h"
+#include "methods/round/pieces/totals.h"
 
 namespace overlapper::lenses {
 
@@ -14,5 +17,24 @@ namespace overlapper::lenses {
 /// `outwards` scales the second body about its centre, by at least as much. No value if the error would exceed 1e-8 of
 /// the volume.
 std::optional<pieces::RoundMeasures> measure_lenses(const pieces::SlicedPair& pair);
+
+/// The rounding of all terms of a slack, and of all sums of slices, in units of the last bit.
+inline constexpr double kRoundings = 16;
+
+/// What an ellipsoid shares with all parts of another body. Coordinates are along the ellipsoid's axes, in units of its
+/// half axes, about the inner point.
+struct InEllipsoid {
+  quadric::Stretch stretch;
+  WideVector centre;     ///< of the ellipsoid
+  double misplaced = 0;  ///< of surfaces, by double-doubles
+  bool with_area = true;
+  std::optional<View> view = {};
+  double moved = 0;  ///< m: bound of the movement of surfaces by rounding, set by add_part()
+};
+
+/// Adds what the ellipsoid shares with the part of a ball or a cylinder inside walls. The ellipsoid is body 0, and the
+/// patch is of its surface. The radius and the axis of the round are those of the world, along the ellipsoid's axes.
+/// False if a part cannot be measured.
+bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slicing::Wall> walls, pieces::Sums& sums);
 
 }  // namespace overlapper::lenses

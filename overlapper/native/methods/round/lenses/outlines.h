@@ -9,8 +9,9 @@ namespace overlapper::lenses {
 /// Values of t, in ascending order: the ends of the common set, and the changes of the slices' outline between them.
 /// There are some further values: where the two circles nearly touch, and in geometric steps away from a change just
 /// outside an interval.
+inline constexpr int kMostChanges = 256;
 struct Changes {
-  std::array<double, 64> t;
+  std::array<double, kMostChanges> t;
   int count = 0;
 
   void add(double at) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "geometry/constants.h"
+#include "methods/round/lenses/region.h"
 #include "methods/round/quadric/gauss.h"
 #include "methods/round/quadric/segment.h"
 
@@ -42,12 +43,12 @@ Mat3 operator+(const Mat3& a, const Mat3& b) { return {a.row0 + b.row0, a.row1 +
 /// A slice, with the data for its parts. Vectors have one component across the slices, then two in the plane.
 struct Place {
   const Discs& discs;
-  double t;
+  double t, tail;
   Section section;
   Vec3 ahead, aside;  ///< in the plane
   Vec3 foot;
 
-  Place(const Discs& of, double at) : discs(of), t(at), section(lenses::section(of, at)) {
+  Place(const Discs& of, double at, double tail_) : discs(of), t(at), tail(tail_), section(lenses::section(of, at)) {
     ahead = {0, section.ahead.x, section.ahead.y}, aside = {0, -section.ahead.y, section.ahead.x};
     foot = {t, t * of.lean.x, t * of.lean.y};
   }
@@ -55,47 +56,91 @@ struct Place {
   Vec3 world(Vec3 v) const { return v.x * discs.normal + v.y * discs.x + v.z * discs.y; }
 };
 
-/// Adds a set with the axis of symmetry `ahead` through the origin, shifted to `middle`.
-void add_moments(const Place& place, Vec3 middle, double area, double ahead, double along, double across, Sums& sums) {
-  const Vec3 e = place.ahead, f = place.aside;
-  const Vec3 first = ahead * e + area * middle, g = ahead * e;
-  Moments m{area, first, {}, {}};
-  m.squares = along * scaled(e, e) + across * scaled(f, f) + 2.0 * scaled(g, middle) + area * scaled(middle, middle);
+/// Integrals over a flat set, about a point and along two axes.
+struct FlatMoments {
+  double area = 0;
+  Flat first;
+  double xx = 0, yy = 0, xy = 0;
+
+  /// Adds a set that is symmetric to its axis `ahead` through `middle`.
+  void add(Flat middle, Flat ahead, double set_area, double along_axis, double second_along, double second_across) {
+    const Flat e = ahead, shift = along_axis * e;
+    area += set_area;
+    first = first + shift + set_area * middle;
+    xx += second_along * e.x * e.x + second_across * e.y * e.y + (2 * shift.x + set_area * middle.x) * middle.x;
+    yy += second_along * e.y * e.y + second_across * e.x * e.x + (2 * shift.y + set_area * middle.y) * middle.y;
+    xy += (second_along - second_across) * e.x * e.y + shift.x * middle.y + shift.y * middle.x +
+          set_area * middle.x * middle.y;
+  }
+  /// Adds a triangle of corners a, b and c, counter-clockwise.
+  void add(Flat a, Flat b, Flat c) {
+    const double set_area = cross(b - a, c - a) / 2, part = set_area / 12;
+    const Flat sum = a + b + c;
+    area += set_area;
+    first = first + (set_area / 3) * sum;
+    xx += part * (a.x * a.x + b.x * b.x + c.x * c.x + sum.x * sum.x);
+    yy += part * (a.y * a.y + b.y * b.y + c.y * c.y + sum.y * sum.y);
+    xy += part * (a.x * a.y + b.x * b.y + c.x * c.y + sum.x * sum.y);
+  }
+};
+
+/// Adds a set of the slice. Its flat moments are about `middle`, along the axes e and f.
+void add_moments(const FlatMoments& of, Vec3 middle, Vec3 e, Vec3 f, Sums& sums) {
+  const Vec3 g = of.first.x * e + of.first.y * f;
+  Moments m{of.area, g + of.area * middle, {}, {}};
+  m.squares = of.xx * scaled(e, e) + of.yy * scaled(f, f) + 2 * of.xy * scaled(e, f) + 2.0 * scaled(g, middle) +
+              of.area * scaled(middle, middle);
   const auto products = [](Vec3 a, Vec3 b) { return Vec3{a.y * b.z, a.z * b.x, a.x * b.y}; };
-  m.products = along * products(e, e) + across * products(f, f) + products(g, middle) + products(middle, g) +
-               area * products(middle, middle);
-  sums.moments = m;
+  m.products = of.xx * products(e, e) + of.yy * products(f, f) + of.xy * (products(e, f) + products(f, e)) +
+               products(g, middle) + products(middle, g) + of.area * products(middle, middle);
+  sums.moments += m;
 }
 
-/// Adds the area vectors of an arc of the first body's surface about the middle of its chord.
-void add_force(const Place& place, Vec3 chord, const Arc& a, double segment_area, Sums& sums) {
+/// An arc in the slice, with the middle of its chord and unit vectors from there to the arc and along the chord.
+struct PlacedArc {
+  Arc arc;
+  Vec3 chord, ahead, aside;
+};
+
+/// Adds the area vectors of an arc of the first body's surface.
+void add_force(const Place& place, const PlacedArc& of, double segment_area, Sums& sums) {
   const double level = place.t - place.discs.first_level;
-  const Vec3 normal{1, 0, 0};
-  sums.force = 2 * a.radius * a.sine * place.ahead + 2 * a.half_angle * level * normal;
-  sums.moved = outer(chord, sums.force) + outer(segment_area * place.ahead, place.ahead) +
-               outer(segment_area * place.aside, place.aside) +
-               outer(2 * a.radius * level * bulge(a) * place.ahead, normal);
+  const Arc& a = of.arc;
+  const Vec3 normal{1, 0, 0}, force = 2 * a.radius * a.sine * of.ahead + 2 * a.half_angle * level * normal;
+  sums.force += force;
+  sums.moved = sums.moved +
+               (outer(of.chord, force) + outer(segment_area * of.ahead, of.ahead) +
+                outer(segment_area * of.aside, of.aside) + outer(2 * a.radius * level * bulge(a) * of.ahead, normal));
 }
 
-/// Adds the areas of the arcs on both surfaces.
-void add_areas(const Place& place, const Arc& first, const Arc& second, const Wanted& wanted, Sums& sums) {
+/// Adds the area of an arc of the first body's surface.
+void add_first_area(const Place& place, const PlacedArc& of, const Wanted& wanted, Sums& sums) {
   const Discs& d = place.discs;
-  const Vec3 e = place.world(place.ahead), f = place.world(place.aside);
-  if (first.half_angle > 0)
-    sums.first_area =
-        wanted.first->arc((place.t - d.first_level) * d.normal, first.radius * e, first.radius * f, first.half_angle);
-  if (!(second.half_angle > 0)) return;
+  const Vec3 e = place.world(of.ahead), f = place.world(of.aside);
+  sums.first_area +=
+      wanted.first->arc((place.t - d.first_level) * d.normal, of.arc.radius * e, of.arc.radius * f, of.arc.half_angle);
+}
+
+/// Adds the area of an arc of the second body's surface.
+void add_second_area(const Place& place, const PlacedArc& of, const Wanted& wanted, Sums& sums) {
+  const Discs& d = place.discs;
+  if (d.second_area > 0) {
+    sums.second_area += 2 * of.arc.half_angle * d.second_area;
+    return;
+  }
+  const Vec3 e = place.world(of.ahead), f = place.world(of.aside);
   const Flat centre = d.second_centre().at(place.t);
   const Vec3 level = d.second_ball * place.world(place.foot + Vec3{0, centre.x, centre.y}) - d.second_middle;
-  sums.second_area = d.second_rise * wanted.second->arc(level, -second.radius * (d.second_ball * e),
-                                                        second.radius * (d.second_ball * f), second.half_angle);
+  sums.second_area += d.second_rise * wanted.second->arc(level, of.arc.radius * (d.second_ball * e),
+                                                         of.arc.radius * (d.second_ball * f), of.arc.half_angle);
 }
 
 /// Adds the patch's integrals along an arc of the first body's surface, by Gauss's nodes in each half.
-void add_patch(const Place& place, Vec3 centre, const Arc& a, const View& view, Sums& sums) {
+void add_patch(const Place& place, const PlacedArc& of, const View& view, Sums& sums) {
+  const Arc& a = of.arc;
   const double level = place.t - place.discs.first_level;
-  const Vec3 e = place.world(place.ahead), f = place.world(place.aside), n = place.discs.normal;
-  const Vec3 from = place.world(centre);
+  const Vec3 e = place.world(of.ahead), f = place.world(of.aside), n = place.discs.normal;
+  const Vec3 from = place.world(of.chord);
   for (const double half : {-1.0, 1.0})
     for (size_t i = 0; i < 2 * quadric::kGaussNode.size(); ++i) {
       const size_t node = i / 2;
@@ -112,11 +157,36 @@ void add_patch(const Place& place, Vec3 centre, const Arc& a, const View& view, 
     }
 }
 
-/// The movement of a lens's arcs by rounding, as slacks of both discs, in units of the last bit. The half chord is a
-/// root of slack + aside² + chord (2 along − chord). Here `along` and `aside` are the mean centre in the slice's own
-/// axes. The chord is half the difference of the slacks, over the distance of the centres. Places are at most `reach`
-/// from the foot.
-void add_blur_of_lens(const Place& place, const Arc& first, const Arc& second, double reach, Sums& sums) {
+/// Adds the wanted sums of an arc of the first body's surface.
+void add_first(const Place& place, const PlacedArc& of, double segment_area, const Wanted& wanted, Sums& sums) {
+  add_force(place, of, segment_area, sums);
+  if (wanted.view) add_patch(place, of, *wanted.view, sums);
+  if (wanted.first) add_first_area(place, of, wanted, sums);
+  if (wanted.closing) sums.border += 2 * of.arc.half_angle;
+}
+
+/// Adds the wanted sums of an arc of the second body's surface.
+void add_second(const Place& place, const PlacedArc& of, const Wanted& wanted, Sums& sums) {
+  if (wanted.first) add_second_area(place, of, wanted, sums);
+  if (!wanted.closing) return;
+  const Discs& d = place.discs;
+  const Flat moves = d.lean + d.second_centre().slope;
+  const double grows = d.second_square[1] / 2 + d.second_square[2] * place.t;
+  const double chord = 2 * of.arc.radius * of.arc.sine, angle = 2 * of.arc.half_angle;
+  const double back = angle * grows + chord * (of.ahead.y * moves.x + of.ahead.z * moves.y);
+  sums.second_force += Vec3{-back, 0, 0} + chord * of.ahead;
+  const double square = of.arc.radius * of.arc.radius;
+  sums.border += angle * std::sqrt(square + grows * grows + square * dot(moves, moves));
+}
+
+/// The terms of a lens's slacks, and of its centres along the line of centres, whose rounding moves its arcs. The half
+/// chord is a root of slack + aside² + chord (2 along − chord). Here `along` and `aside` are the mean centre in the
+/// slice's own axes. The chord is half the difference of the slacks, over the distance of the centres. Places are at
+/// most `away` from the foot.
+struct Terms {
+  double slack, centre, away;
+};
+Terms terms_of_lens(const Place& place, double reach) {
   const Discs& d = place.discs;
   const Section& s = place.section;
   const double t = place.t, chord = std::abs(s.chord), aside = std::abs(s.aside), away = chord + aside + reach;
@@ -127,12 +197,17 @@ void add_blur_of_lens(const Place& place, const Arc& first, const Arc& second, d
   const double sizes = size_at(d.slack, t) + size_at(d.difference, t) * (1 + lever / apart);
   const double terms = sizes + away * away + d.misplaced + 2 * aside * (centres + along * bend) +
                        2 * chord * (centres + (aside + lever) * bend);
+  return {terms, centres + size_at(d.apart, t) + chord * bend, away};
+}
+
+/// The movement of a lens's arcs by rounding, as slacks of both discs, in units of the last bit.
+void add_blur_of_lens(const Place& place, const Arc& first, const Arc& second, double reach, Sums& sums) {
+  const Terms terms = terms_of_lens(place, reach);
   // A misplaced centre along the line of centres changes its segment.
-  const double to_centres = centres + size_at(d.apart, t) + chord * bend;
-  sums.blur = (first.half_angle + second.half_angle) * terms +
-              2 * to_centres * (first.radius * bulge(first) + second.radius * bulge(second));
-  sums.oval = second.half_angle * away * away;
-  sums.terms = terms;
+  sums.blur = (first.half_angle + second.half_angle) * terms.slack +
+              2 * terms.centre * (first.radius * bulge(first) + second.radius * bulge(second));
+  sums.oval = second.half_angle * terms.away * terms.away;
+  sums.terms = terms.slack;
 }
 
 /// The same for a whole disc.
@@ -141,6 +216,135 @@ void add_blur_of_disc(const Place& place, double half_angle, const Quadratic& sq
   sums.blur = half_angle * terms;
   sums.oval = is_second ? half_angle * at(square, place.t) : 0;
   sums.terms = terms;
+}
+
+Sums whole_slice(const Place& place, const Wanted& wanted) {
+  const Discs& discs = place.discs;
+  const Section& s = place.section;
+  const double t = place.t;
+  Sums sums;
+  Arc first = kNone, second = kNone;
+  Vec3 middle = place.chord();
+  double of_first = 0;
+  FlatMoments flat;
+  if (s.outline == Outline::kLens) {
+    first = arc(s.half_chord, s.to_first), second = arc(s.half_chord, s.to_second);
+    const quadric::Segment a = segment(first), b = segment(second);
+    of_first = a.area;
+    flat = {a.area + b.area,
+            {a.first_across - b.first_across, 0},
+            a.second_across + b.second_across,
+            a.second_along + b.second_along,
+            0};
+    const double rise = std::max(first.radius - s.to_first, second.radius - s.to_second);
+    add_blur_of_lens(place, first, second, s.half_chord + rise, sums);
+  } else {
+    const bool is_first = s.outline == Outline::kFirst;
+    const double square = std::max(0.0, at(is_first ? discs.first_square : discs.second_square, t));
+    const Flat centre = (is_first ? discs.first_centre() : discs.second_centre()).at(t);
+    (is_first ? first : second) = whole_circle(std::sqrt(square));
+    middle = place.foot + Vec3{0, centre.x, centre.y};
+    const double area = kPi * square;
+    if (is_first) of_first = area;
+    flat = {area, {}, area * square / 4, area * square / 4, 0};
+    add_blur_of_disc(place, kPi, is_first ? discs.first_square : discs.second_square, !is_first, sums);
+  }
+  add_moments(flat, middle, place.ahead, place.aside, sums);
+  // The chord of a whole circle is a point, opposite to `ahead`.
+  const bool lens = s.outline == Outline::kLens;
+  if (first.half_angle > 0) {
+    const PlacedArc of{first, lens ? middle : middle - first.radius * place.ahead, place.ahead, place.aside};
+    add_first(place, of, of_first, wanted, sums);
+  }
+  if (second.half_angle > 0) {
+    const double side = lens ? -1 : 1;
+    const PlacedArc of{second, lens ? middle : middle - second.radius * place.ahead, side * place.ahead, place.aside};
+    add_second(place, of, wanted, sums);
+  }
+  return sums;
+}
+
+/// The blur of a region that walls cut: that of its arcs, and that of the walls.
+void add_blur_of_region(const Place& place, const Region& of, const std::array<double, 2>& half_angle,
+                        const std::array<double, kMostCuts>& length, Sums& sums) {
+  const Discs& d = place.discs;
+  const Section& s = place.section;
+  double reach = 0;
+  for (int i = 0; i < of.corners; ++i)
+    reach = std::max({reach, std::abs(of.corner[i].at.x), std::abs(of.corner[i].at.y)});
+  if (of.about_foot) {
+    const std::array<const Quadratic*, 2> slack{&d.first_slack, &d.second_slack};
+    const std::array<Line, 2> centre{d.first_centre(), d.second_centre()};
+    for (const int k : {0, 1}) {
+      if (!(half_angle[k] > 0)) continue;
+      const double terms =
+          size_at(*slack[k], place.t) + reach * (2 * size_at(centre[k], place.t) + reach) + d.misplaced;
+      sums.blur += half_angle[k] * terms, sums.terms = std::max(sums.terms, terms);
+    }
+    sums.oval = half_angle[1] * reach * reach;
+  } else {
+    const Terms terms = terms_of_lens(place, reach);
+    const std::array<double, 2> rise{of.circle[0].radius - s.to_first, of.circle[1].radius - s.to_second};
+    sums.blur = (half_angle[0] + half_angle[1]) * terms.slack +
+                2 * terms.centre * (half_angle[0] * rise[0] + half_angle[1] * rise[1]);
+    sums.oval = half_angle[1] * terms.away * terms.away;
+    sums.terms = terms.slack;
+  }
+  const double away = std::abs(of.origin.x) + std::abs(of.origin.y) + reach;
+  for (int i = 0; i < d.cuts; ++i) {
+    if (!(length[i] > 0)) continue;
+    const Cut& cut = d.cut[i];
+    const double terms = (std::abs(cut.offset) + std::abs(cut.rate * place.t) + d.misplaced) / cut.length + away;
+    sums.blur += length[i] * terms;
+    sums.terms = std::max(sums.terms, terms);
+  }
+}
+
+/// Adds the strip of a wall along a line of the slice.
+void add_wall(const Place& place, const Cut& cut, double length, const Wanted& wanted, Sums& sums) {
+  const double part = length / cut.length;
+  const Vec3 normal{cut.across, cut.normal.x, cut.normal.y};
+  (cut.face ? sums.second_force : sums.cut_force) += part * normal, sums.border += part;
+  if (!wanted.first || !cut.face) return;
+  const double area = part * wanted.first->area(place.world(normal));
+  sums.second_area += area, sums.face_area += area;
+}
+
+Sums cut_slice(const Place& place, const Wanted& wanted) {
+  const Region of = region(place.discs, place.section, place.t, place.tail);
+  Sums sums;
+  if (of.empty()) return sums;
+  if (of.whole || (of.corners == 2 && of.corner[0].curve == 0 && of.corner[1].curve == 1))
+    return whole_slice(place, wanted);
+  const Vec3 e{0, of.ahead.x, of.ahead.y}, f{0, of.aside().x, of.aside().y};
+  const Vec3 origin = place.foot + Vec3{0, of.origin.x, of.origin.y};
+  FlatMoments flat;
+  std::array<double, 2> half_angle{};
+  std::array<double, kMostCuts> length{};
+  for (int i = 0; i < of.corners; ++i) {
+    const auto [from, curve] = of.corner[i];
+    const Flat to = of.next(i), way = to - from;
+    if (i > 0 && i + 1 < of.corners) flat.add(of.corner[0].at, from, to);
+    const double whole = std::sqrt(dot(way, way));
+    if (!(whole > 0)) continue;
+    if (curve >= 2) {
+      length[curve - 2] = whole;
+      add_wall(place, place.discs.cut[curve - 2], whole, wanted, sums);
+      continue;
+    }
+    const Circle& circle = of.circle[curve];
+    const Flat along = (1 / whole) * way, out{along.y, -along.x}, middle = 0.5 * (from + to);
+    const Arc a = arc(whole / 2, dot(middle - circle.centre, out));
+    const quadric::Segment s = segment(a);
+    flat.add(middle, out, s.area, s.first_across, s.second_across, s.second_along);
+    half_angle[curve] += a.half_angle;
+    const PlacedArc placed{a, origin + (middle.x * e + middle.y * f), out.x * e + out.y * f, along.x * e + along.y * f};
+    if (curve == 0) add_first(place, placed, s.area, wanted, sums);
+    else add_second(place, placed, wanted, sums);
+  }
+  add_moments(flat, origin, e, f, sums);
+  add_blur_of_region(place, of, half_angle, length, sums);
+  return sums;
 }
 
 }  // namespace
@@ -153,44 +357,23 @@ void Sums::add(double weight, const Sums& other) {
       moved.row2 += weight * other.moved.row2;
   blur += weight * other.blur, oval += weight * other.oval, terms = std::max(terms, other.terms);
   first_area += weight * other.first_area, second_area += weight * other.second_area;
+  face_area += weight * other.face_area, border += weight * other.border;
+  second_force += weight * other.second_force, cut_force += weight * other.cut_force;
   for (size_t i = 0; i < patch.size(); ++i) patch[i] += weight * other.patch[i];
 }
 
-Sums slice(const Discs& discs, double t, const Wanted& wanted) {
-  const Place place(discs, t);
-  const Section& s = place.section;
-  Sums sums;
-  if (s.outline == Outline::kNothing) return sums;
-  Arc first = kNone, second = kNone;
-  Vec3 middle = place.chord();
-  double of_first = 0;
-  if (s.outline == Outline::kLens) {
-    first = arc(s.half_chord, s.to_first), second = arc(s.half_chord, s.to_second);
-    const quadric::Segment a = segment(first), b = segment(second);
-    of_first = a.area;
-    add_moments(place, middle, a.area + b.area, a.first_across - b.first_across, a.second_across + b.second_across,
-                a.second_along + b.second_along, sums);
-    const double rise = std::max(first.radius - s.to_first, second.radius - s.to_second);
-    add_blur_of_lens(place, first, second, s.half_chord + rise, sums);
-  } else {
-    const bool is_first = s.outline == Outline::kFirst;
-    const double square = std::max(0.0, at(is_first ? discs.first_square : discs.second_square, t));
-    const Flat centre = (is_first ? discs.first_centre() : discs.second_centre()).at(t);
-    (is_first ? first : second) = whole_circle(std::sqrt(square));
-    middle = place.foot + Vec3{0, centre.x, centre.y};
-    const double area = kPi * square;
-    if (is_first) of_first = area;
-    add_moments(place, middle, area, 0, area * square / 4, area * square / 4, sums);
-    add_blur_of_disc(place, kPi, is_first ? discs.first_square : discs.second_square, !is_first, sums);
-  }
-  if (first.half_angle > 0) {
-    // The chord of a whole circle is a point, opposite to `ahead`.
-    const Vec3 chord = s.outline == Outline::kLens ? middle : middle - first.radius * place.ahead;
-    add_force(place, chord, first, of_first, sums);
-    if (wanted.view) add_patch(place, chord, first, *wanted.view, sums);
-  }
-  if (wanted.first) add_areas(place, first, second, wanted, sums);
-  return sums;
+Sums slice(const Discs& discs, double t, const Wanted& wanted, double tail) {
+  const Place place(discs, t, tail);
+  if (place.section.outline == Outline::kNothing) return {};
+  return discs.cuts > 0 ? cut_slice(place, wanted) : whole_slice(place, wanted);
+}
+
+void add_end(const Discs& discs, const Cut& end, double area, const Wanted& wanted, Sums& sums) {
+  const double side = end.across > 0 ? 1 : -1;
+  (end.face ? sums.second_force : sums.cut_force) += Vec3{side * area, 0, 0}, sums.border += area;
+  if (!wanted.first || !end.face) return;
+  const double stretched = area * wanted.first->area(discs.normal);
+  sums.second_area += stretched, sums.face_area += stretched;
 }
 
 }  // namespace overlapper::lenses

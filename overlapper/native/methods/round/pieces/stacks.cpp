@@ -151,7 +151,10 @@ void add_sum(const Stack& stack, const slicing::Sum& sum, Vec3 offset, const qua
   totals.border += s.border;
   const Vec3 pull = turned(s.pull[0]);
   totals.pull += pull;
-  totals.moment += turned(s.moment[0]) + (stretch ? stretch->moment(offset, pull) : cross(offset, pull));
+  // The moment of a stretched ball's own surface is opposite to that of all other surface, as both close.
+  const bool of_stretched = stretch && stack.ball >= 0 && stack.quadric[stack.ball].owner == 0;
+  const Vec3 moment = of_stretched ? -(s.moment[1] + s.moment[2]) : s.moment[0];
+  totals.moment += turned(moment) + (stretch ? stretch->moment(offset, pull) : cross(offset, pull));
   totals.unbalanced += turned(s.pull[0] + s.pull[1]);
   if (sums.patch) sums.patch->add(s.seen[0], s.seen[1], s.seen[2], s.seen[3], s.seen[4], s.seen[5]);
 }

@@ -1,6 +1,7 @@
 #include <limits>
 
 #include "geometry/scratch.h"
+#include "methods/round/lenses/lenses.h"
 #include "methods/round/pieces/measure.h"
 #include "methods/round/pieces/piece.h"
 #include "methods/round/pieces/pieces.h"
@@ -8,12 +9,14 @@
 namespace overlapper::pieces {
 namespace {
 
-/// Maps an ellipsoid to a ball of radius 1, and maps the pieces with it. The axes are those of the ellipsoid.
+/// Maps an ellipsoid to a ball of radius 1, and maps the pieces with it. The axes are those of the ellipsoid. Radii and
+/// axes of rounds stay as long as they are in the world.
 void into_ball(const Placed& ellipsoid, Vec3 h, Pieces& pieces) {
   const WideMatrix rotation = wide_rotation(ellipsoid.orientation);
   for (Round& r : pieces.rounds) {
     const WideVector centre = apply_transposed(rotation, r.centre);
     r.centre = {centre.x / DoubleDouble{h.x}, centre.y / DoubleDouble{h.y}, centre.z / DoubleDouble{h.z}};
+    if (!r.ball) r.axis = apply_transposed(rotation, r.axis);
   }
   for (Wall& wall : pieces.walls) {
     const WideVector own = apply_transposed(rotation, wall.normal);
@@ -88,9 +91,43 @@ double inertia_error(const Totals& totals, const quadric::Stretch& stretch) {
          (dot(scaled(h, h), squares) + dot(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, products));
 }
 
-}  // namespace
+/// The sums of the ball, and their errors.
+struct OfBall {
+  const Totals& totals;
+  double error;                 ///< of the volume, in units of the ball's
+  double misplaced;             ///< m: error of surfaces
+  std::optional<double> moved;  ///< m: bound of the movement of surfaces by rounding, if known
+  Vec3 origin;                  ///< the point that the sums are about, relative to the inner point
+};
 
 /// Volumes are multiplied by the determinant. The matrix of cofactors maps area vectors.
+RoundMeasures in_world(const OfBall& of, const SlicedPair& pair, const Placed& ellipsoid,
+                       const quadric::Stretch& stretch, bool swapped) {
+  const Totals& totals = of.totals;
+  const Vec3 h = stretch.half_axes;
+  const Mat3& turn = ellipsoid.pose.rotation;
+  const Moments whole = stretch.moments(totals);
+  RoundMeasures result;
+  result.volume = whole.volume;
+  result.area = totals.area;
+  result.first_area = swapped ? totals.area - totals.first_area : totals.first_area;
+  result.area_error =
+      totals.area_error + stretch.open() * totals.area + missing_area(stretch.normal(totals.unbalanced), totals.area);
+  result.volume_error = stretch.volume * (of.error + 4 * DBL_EPSILON * totals.volume) + of.misplaced * totals.area;
+  const Vec3 origin = rounded(pair.inside) + turn * scaled(h, of.origin);
+  result.centroid = origin + turn * scaled(h, totals.first / totals.volume);
+  result.inertia = turn * whole.inertia_about_centroid() * transposed(turn);
+  result.inertia_error = inertia_error(totals, stretch);
+  result.rounding =
+      of.moved ? *of.moved : rounding_of_surfaces(sum_of(whole.squares) / result.volume + norm2(scaled(h, of.origin)));
+  const double side = swapped ? -1 : 1;
+  const Pull pull{side * (turn * stretch.normal(totals.pull)), side * (turn * totals.moment)};
+  result.pull = about(pull, origin, {});
+  return result;
+}
+
+}  // namespace
+
 std::optional<RoundMeasures> measure_stretched(const SlicedPair& pair) {
   const bool swapped = stretched(pair.b.shape) == nullptr;
   const Placed &flat = swapped ? pair.b : pair.a, &ellipsoid = swapped ? pair.a : pair.b;
@@ -103,32 +140,68 @@ std::optional<RoundMeasures> measure_stretched(const SlicedPair& pair) {
   const Vec3 h = stretched(ellipsoid.shape)->half_axes;
   into_ball(ellipsoid, h, of_flat);
   into_ball(ellipsoid, h, of_ellipsoid);
-  const Mat3& turn = ellipsoid.pose.rotation;
   const quadric::Stretch stretch(h);
-  const BallSums best =
-      best_of_ball(of_ellipsoid.rounds, of_flat.walls, pair, swapped ? 1 - pair.owner : pair.owner, turn, stretch);
-  const Totals& totals = best.sums.totals;
-  const double volume = totals.volume;
+  const BallSums best = best_of_ball(of_ellipsoid.rounds, of_flat.walls, pair, swapped ? 1 - pair.owner : pair.owner,
+                                     ellipsoid.pose.rotation, stretch);
+  const double volume = best.sums.totals.volume;
   if (!(volume > 0 && best.error <= kMostError * volume)) return std::nullopt;
   if (pair.patch) *pair.patch = *best.sums.patch;
-  const Moments whole = stretch.moments(totals);
-  RoundMeasures result;
-  result.volume = whole.volume;
-  result.area = totals.area;
-  result.first_area = swapped ? totals.area - totals.first_area : totals.first_area;
-  result.area_error =
-      totals.area_error + stretch.open() * totals.area + missing_area(stretch.normal(totals.unbalanced), totals.area);
-  result.volume_error = stretch.volume * (best.error + 4 * DBL_EPSILON * volume) +
-                        (of_flat.misplaced() + of_ellipsoid.rounding) * totals.area;
-  const Vec3 origin = rounded(pair.inside) + turn * scaled(h, best.moved);
-  result.centroid = origin + turn * scaled(h, totals.first / volume);
-  result.inertia = turn * whole.inertia_about_centroid() * transposed(turn);
-  result.inertia_error = inertia_error(totals, stretch);
-  result.rounding = rounding_of_surfaces(sum_of(whole.squares) / result.volume + norm2(scaled(h, best.moved)));
-  const double side = swapped ? -1 : 1;
-  const Pull pull{side * (turn * stretch.normal(totals.pull)), side * (turn * totals.moment)};
-  result.pull = about(pull, origin, {});
+  RoundMeasures result =
+      in_world({best.sums.totals, best.error, of_flat.misplaced() + of_ellipsoid.rounding, {}, best.moved}, pair,
+               ellipsoid, stretch, swapped);
   result.facets_touched = static_cast<int>(of_flat.walls.size());
+  return result;
+}
+
+std::optional<RoundMeasures> measure_stretched_in_parts(const SlicedPair& pair) {
+  const bool swapped = stretched(pair.b.shape) != nullptr;
+  const Placed &other = swapped ? pair.a : pair.b, &ellipsoid = swapped ? pair.b : pair.a;
+  const Scratch<StretchedPieces> scratch;
+  auto& [of_other, of_ellipsoid] = *scratch;
+  of_other.clear(), of_ellipsoid.clear();
+  EnclosingPolytope common;
+  const bool many = facets(other.shape) > 0;
+  if (many) enclose(other, ellipsoid, rounded(pair.inside), common);
+  cut(other, ellipsoid, many ? &common : nullptr, 1, pair.reference, pair.inside, of_other);
+  cut(ellipsoid, other, nullptr, 0, pair.reference, pair.inside, of_ellipsoid);
+  if (pair.outwards != 0 && !grow(of_other, pair.outwards)) return std::nullopt;
+  const Vec3 h = stretched(ellipsoid.shape)->half_axes;
+  into_ball(ellipsoid, h, of_other);
+  into_ball(ellipsoid, h, of_ellipsoid);
+  const Mat3& turn = ellipsoid.pose.rotation;
+  const quadric::Stretch stretch(h);
+  const double misplaced = of_other.misplaced() + of_ellipsoid.rounding;
+
+  PieceSetting setting;
+  setting.stretch = &stretch;
+  setting.extent = norm(rounded(of_ellipsoid.rounds[0].centre)) + 1;
+  Sums sums;
+  sums.patch = pair.patch ? std::optional(*pair.patch) : std::nullopt;
+  lenses::InEllipsoid in{stretch, of_ellipsoid.rounds[0].centre, misplaced / std::min({h.x, h.y, h.z})};
+  in.with_area = pair.with_area;
+  if (pair.patch) {
+    setting.view = stretched_view(PatchView(*pair.patch, 0), turn, stretch, {});
+    in.view = lenses::View{setting.view.u0, setting.view.v0, setting.view.u, setting.view.v, setting.view.normal};
+  }
+  for (size_t i = 0; i < of_other.pieces.size(); ++i) {
+    const int round = of_other.pieces[i].round;
+    const std::span<const Wall> walls = of_other.of(static_cast<int>(i));
+    if (round < 0 ? !add_piece(of_ellipsoid.rounds, walls, nullptr, setting, sums)
+                  : !lenses::add_part(in, of_other.rounds[round], walls, sums))
+      return std::nullopt;
+  }
+  const Totals& totals = sums.totals;
+  const double volume = totals.volume, error = totals.error + open_volume(totals) + of_other.gaps / stretch.volume;
+  if (!(volume > 0 && error <= kMostError * volume)) return std::nullopt;
+  if (pair.patch) {
+    // The patch is that of the ellipsoid's surface. Seen from the other body, it has the opposite sign.
+    const PatchSums none = *pair.patch;
+    const bool same = (pair.owner == 0) != swapped;
+    pair.patch->add_difference(same ? *sums.patch : none, same ? none : *sums.patch);
+  }
+  RoundMeasures result = in_world({totals, error, misplaced, in.moved, {}}, pair, ellipsoid, stretch, swapped);
+  result.area_error += of_other.gap_area;
+  result.area_known = pair.with_area;
   return result;
 }
 

@@ -1,0 +1,79 @@
+#include <algorithm>
+#include <cfloat>
+
+#include "methods/round/lenses/integrate.h"
+#include "methods/round/lenses/lenses.h"
+
+namespace overlapper::lenses {
+namespace {
+
+WideVector scaled_by(Vec3 a, const WideVector& b) {
+  return {DoubleDouble{a.x} * b.x, DoubleDouble{a.y} * b.y, DoubleDouble{a.z} * b.z};
+}
+
+SecondBall second_ball(const slicing::Round& round, Vec3 half_axes) {
+  const DoubleDouble radius{round.radius};
+  SecondBall second;
+  if (round.ball) {
+    second.k = {{DoubleDouble{half_axes.x} / radius, {}, {}},
+                {{}, DoubleDouble{half_axes.y} / radius, {}},
+                {{}, {}, DoubleDouble{half_axes.z} / radius}};
+  } else {
+    const WideVector u = unit(cross(round.axis, wide(any_orthogonal(rounded(round.axis)))));
+    second.k = {scaled_by(half_axes, u) / radius, scaled_by(half_axes, cross(round.axis, u)) / radius, {}};
+    second.cylinder = true;
+  }
+  second.middle = second.k * round.centre;
+  return second;
+}
+
+/// m² of the round's surface per angle and distance between slices. In the world, too, sections of the round are
+/// circles, and angles are the same.
+double area_rate(const slicing::Round& round, Vec3 across, Vec3 half_axes) {
+  const Vec3 steep{across.x / half_axes.x, across.y / half_axes.y, across.z / half_axes.z};
+  return round.radius / (round.ball ? norm(steep) : std::abs(dot(steep, rounded(round.axis))));
+}
+
+}  // namespace
+
+bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slicing::Wall> walls, pieces::Sums& sums) {
+  std::vector<Wall> own;
+  for (const slicing::Wall& wall : walls) own.push_back({wall.normal, wall.slack, wall.owner != slicing::kCut});
+  std::optional<Discs> found = discs(of.centre, second_ball(round, of.stretch.half_axes), own);
+  if (!found) return false;
+  found->misplaced = of.misplaced / (kRoundings * DBL_EPSILON);
+  found->second_area = area_rate(round, found->normal, of.stretch.half_axes);
+  pieces::Totals& totals = sums.totals;
+  Wanted wanted;
+  if (of.with_area) wanted.first = &of.stretch;
+  wanted.view = of.view;
+  wanted.closing = true;
+  wanted.volume = totals.volume, wanted.border = totals.border;
+  const Integral integral = integrate(*found, wanted);
+  const Sums& part = integral.sums;
+  const double volume = part.moments.volume;
+  if (!(volume > 0)) return true;
+
+  pieces::Totals more;
+  static_cast<Moments&>(more) = part.moments.along({found->normal, found->x, found->y});
+  more.error = integral.error + kRoundings * DBL_EPSILON * (part.blur + volume) + 2 * found->oval * part.oval;
+  more.border = part.border;
+  more.unbalanced = found->along_axes(part.force + part.second_force + part.cut_force);
+  more.open = pieces::missing(more);
+  more.unbalanced = found->along_axes(part.force + part.second_force);
+  more.area = part.first_area + part.second_area;
+  more.first_area = part.first_area;
+  more.pull = found->along_axes(part.force);
+  more.moment = found->moment(part.moved, of.stretch);
+  totals.add(more);
+  totals.sizes += Moments{volume, abs(more.first), more.squares, abs(more.products)};
+  totals.area_error += integral.area_error;
+  of.moved = std::max(of.moved, round.radius * (kRoundings * DBL_EPSILON + 2 * found->oval) * part.terms);
+  if (sums.patch) {
+    const auto& p = part.patch;
+    sums.patch->add(p[0], p[1], p[2], p[3], p[4], p[5]);
+  }
+  return true;
+}
+
+}  // namespace overlapper::lenses
