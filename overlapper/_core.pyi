@@ -1459,8 +1459,8 @@ class TimeOfImpact:
     @property
     def point(self) -> numpy.typing.NDArray[numpy.float64] | None:
         """
-        (3,) m, half-way between the nearest points at `time`; the centroid of the common set if overlapping. None if
-        separated.
+        (3,) m, half-way between the nearest points at a time from `time` to `time_upper`; the centroid of the common set if
+        overlapping. None if separated.
         """
 
     @property

@@ -1,6 +1,10 @@
 #include "distance/gjk.h"
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "geometry/rounding.h"
@@ -167,25 +171,70 @@ bool sharpen(const Placed& a, const Placed& b, Separation& cores) {
   return accept(cores, a, b, witness_a, witness_b, x);
 }
 
-}  // namespace
+// The best gap of all rounds: on a rim, the gaps of single rounds scatter by more than this.
+bool settled(double length, double, double best) { return length - best <= 4 * 0x1p-53 * length; }
 
-Separation separate_cores(const Placed& a, const Placed& b) {
-  Vec3 towards = a.pose.translation - b.pose.translation;
-  if (norm2(towards) == 0) towards = {1, 0, 0};
-  const auto support = [&](Vec3 direction) { return core_support(a, b, direction); };
-  // The best gap of all rounds: on a rim, the gaps of single rounds scatter by more than this.
-  const auto settled = [](double length, double, double best) { return length - best <= 4 * 0x1p-53 * length; };
-  Separation cores = separate(support(-towards), support, settled);
+/// Gives the nearest points of curved cores the digits that GJK does not find.
+Separation sharpened(const Placed& a, const Placed& b, Separation cores) {
   const bool curved = has_curved_core(a.shape) || has_curved_core(b.shape);
   if (curved && !cores.origin_inside && cores.gap > 0 && !above_cap(a, b, cores)) sharpen(a, b, cores);
   return cores;
 }
 
-Distance distance(const Placed& a, const Placed& b) {
-  if (!bounded(b.shape)) return distance_to_half_space(a, b);
-  if (!bounded(a.shape)) return mirrored(distance_to_half_space(b, a));
+/// The farthest point of a core in the coordinates of its body, along a direction of the world.
+Vec3 local_support(const Placed& body, Vec3 direction) {
+  const Vec3 own = apply_transposed(body.pose.rotation, direction);
+  return ask(body.shape, [&](const auto& s) { return s.core_support(Pose{}, own); });
+}
+
+/// GJK from the simplex of earlier poses.
+class WarmSearch {
+ public:
+  WarmSearch(const Placed& a, const Placed& b) : a_(a), b_(b) {}
+
+  Separation run(LastSimplex& last) {
+    Simplex start;
+    for (int i = 0; i < last.size; ++i) start.corner[start.size++] = place(last.corner[i]);
+    if (start.size == 0) {
+      const Vec3 towards = a_.pose.translation - b_.pose.translation;
+      start.corner[start.size++] = support(norm2(towards) == 0 ? Vec3{-1, 0, 0} : -towards);
+    }
+    reduce(start);
+    const Separation found = separate(start, [&](Vec3 direction) { return support(direction); }, settled);
+    last.size = 0;
+    for (int i = 0; i < found.simplex.size; ++i) {
+      const DifferencePoint& corner = found.simplex.corner[i];
+      const auto end = known_.begin() + static_cast<std::ptrdiff_t>(std::min(next_, known_.size()));
+      const auto same = std::find_if(known_.begin(), end, [&](const Pair& pair) {
+        return pair.placed.on_a == corner.on_a && pair.placed.on_b == corner.on_b;
+      });
+      if (same != end) last.corner[last.size++] = same->local;
+    }
+    return found;
+  }
+
+ private:
+  struct Pair {
+    DifferencePoint placed, local;
+  };
+
+  DifferencePoint place(const DifferencePoint& local) {
+    const DifferencePoint placed{a_.pose * local.on_a, b_.pose * local.on_b};
+    // A search among curved cores has many points, and only the last ones matter.
+    known_[next_++ % known_.size()] = {placed, local};
+    return placed;
+  }
+  DifferencePoint support(Vec3 direction) {
+    return place({local_support(a_, direction), local_support(b_, -direction)});
+  }
+
+  const Placed &a_, &b_;
+  std::array<Pair, 16> known_{};
+  size_t next_ = 0;
+};
+
+Distance between_cores(const Placed& a, const Placed& b, const Separation& cores) {
   const double radius_a = core_radius(a.shape), radius_b = core_radius(b.shape);
-  const Separation cores = separate_cores(a, b);
   Distance result;
   result.distance = cores.distance - radius_a - radius_b;
   result.gap = cores.gap - radius_a - radius_b;
@@ -199,6 +248,31 @@ Distance distance(const Placed& a, const Placed& b) {
   result.witness_a = cores.simplex.witness_a() - radius_a * result.normal;
   result.witness_b = cores.simplex.witness_b() + radius_b * result.normal;
   return result;
+}
+
+std::optional<Distance> distance_to_plane(const Placed& a, const Placed& b) {
+  if (!bounded(b.shape)) return distance_to_half_space(a, b);
+  if (!bounded(a.shape)) return mirrored(distance_to_half_space(b, a));
+  return std::nullopt;
+}
+
+}  // namespace
+
+Separation separate_cores(const Placed& a, const Placed& b) {
+  Vec3 towards = a.pose.translation - b.pose.translation;
+  if (norm2(towards) == 0) towards = {1, 0, 0};
+  const auto support = [&](Vec3 direction) { return core_support(a, b, direction); };
+  return sharpened(a, b, separate(support(-towards), support, settled));
+}
+
+Distance distance(const Placed& a, const Placed& b) {
+  if (const auto to_plane = distance_to_plane(a, b)) return *to_plane;
+  return between_cores(a, b, separate_cores(a, b));
+}
+
+Distance distance(const Placed& a, const Placed& b, LastSimplex& last) {
+  if (const auto to_plane = distance_to_plane(a, b)) return *to_plane;
+  return between_cores(a, b, sharpened(a, b, WarmSearch(a, b).run(last)));
 }
 
 }  // namespace overlapper

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "distance/simplex.h"
 #include "shapes/shape.h"
 
@@ -20,5 +22,15 @@ struct Distance {
   double overlap = 0;
 };
 Distance distance(const Placed& a, const Placed& b);
+
+/// The simplex in which a search ended. Its corners are in the coordinates of the bodies, so that they move with them.
+struct LastSimplex {
+  std::array<DifferencePoint, 4> corner;
+  int size = 0;
+};
+
+/// The same for the next poses of the same two bodies. The search starts from `last`, and writes its end there. A few
+/// more bits of rounding may differ. `last` is left alone if one body is a half-space.
+Distance distance(const Placed& a, const Placed& b, LastSimplex& last);
 
 }  // namespace overlapper

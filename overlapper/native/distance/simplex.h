@@ -185,18 +185,15 @@ bool contains(const SimplexOf<Vector>& s, const Vector& difference) {
   return false;
 }
 
-/// GJK with witness points (Gilbert, Johnson, Keerthi 1988), from any `first` point of A - B. `support` finds a
-/// farthest point of A - B along a unit vector. `settled(length, gap, best)` decides whether the distance is known well
-/// enough. The distance is at most `length`, and at least `gap` of this round and `best` of all rounds (the duality gap
-/// of Frank and Wolfe).
+/// GJK with witness points (Gilbert, Johnson, Keerthi 1988), from any simplex of points of A - B that reduce() has
+/// reduced. `support` finds a farthest point of A - B along a unit vector. `settled(length, gap, best)` decides whether
+/// the distance is known well enough. The distance is at most `length`, and at least `gap` of this round and `best` of
+/// all rounds (the duality gap of Frank and Wolfe).
 template <class Vector, class Support, class Settled>
-SeparationOf<Vector> separate(const DifferencePointOf<Vector>& first, const Support& support, const Settled& settled) {
+SeparationOf<Vector> separate(const SimplexOf<Vector>& start, const Support& support, const Settled& settled) {
   SeparationOf<Vector> result;
   SimplexOf<Vector>& simplex = result.simplex;
-  simplex.corner[0] = first;
-  simplex.weight[0] = {1};
-  simplex.size = 1;
-  simplex.nearest = first.difference();
+  simplex = start;
   auto least = rank(simplex.nearest);
   // Polytopes end by themselves, as each round finds a new vertex. A cylinder's rim converges: no bit improves after
   // some dozens of rounds.
@@ -236,6 +233,17 @@ SeparationOf<Vector> separate(const DifferencePointOf<Vector>& first, const Supp
   if (result.origin_inside) result.normal = {};
   else result.distance = rounded(norm(simplex.nearest));
   return result;
+}
+
+/// The same from one point of A - B.
+template <class Vector, class Support, class Settled>
+SeparationOf<Vector> separate(const DifferencePointOf<Vector>& first, const Support& support, const Settled& settled) {
+  SimplexOf<Vector> start;
+  start.corner[0] = first;
+  start.weight[0] = {1};
+  start.size = 1;
+  start.nearest = first.difference();
+  return separate(start, support, settled);
 }
 
 }  // namespace overlapper

@@ -115,8 +115,8 @@ certainly separated again, or the end of the motion. None if separated.)");
   property_if_met(
       cls, "point", [](const Impact& i) { return to_numpy(i.point); },
       nb::sig("def point(self) -> numpy.typing.NDArray[numpy.float64] | None"),
-      R"((3,) m, half-way between the nearest points at `time`; the centroid of the common set if overlapping. None if
-separated.)");
+      R"((3,) m, half-way between the nearest points at a time from `time` to `time_upper`; the centroid of the common set if
+overlapping. None if separated.)");
   cls.def_prop_ro(
       "distance", [](const TimeOfImpact& t) { return t.impact.distance; },
       "m, the least distance of the computed poses: an upper bound of the least distance of the motion.");
