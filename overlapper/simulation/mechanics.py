@@ -72,12 +72,14 @@ class Dynamics(Protocol):
 class Mechanics(Protocol):
     """A simulation in which forces replace the simulator's own response to some pairs."""
 
-    @property
-    def restored(self) -> int:
-        """How often a saved state of the bodies was restored."""
-
     def dynamics(self, bodies: Sequence[int]) -> Dynamics:
         """The masses and joints of these bodies."""
+
+    def resumed(self, others: OtherForces) -> OtherForces | None:
+        """Return `others`, or those of the saved state that the script has restored since the last call.
+
+        The solver of the last `dynamics` then has the forces of that state, too. None if the state is not known.
+        """
 
     def enter(
         self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None], step: Callable[[], None]

@@ -192,3 +192,61 @@ def test_a_restored_state_forgets_everything_that_came_after_it(client):
             ways.append(pybullet.getBasePositionAndOrientation(box, physicsClientId=client))
     assert ways[0] == ways[1]
     assert np.abs(_speed(client, box)).max() < 1e-9
+
+
+def _tumbling(client):
+    pybullet.setGravity(0, 0, -G, physicsClientId=client)
+    ground(client)
+    boxes = [_box(client, [0.02 * k, 0.01 * k, 0.07 + 0.11 * k]) for k in range(3)]
+    for k, id in enumerate(boxes):
+        pybullet.resetBaseVelocity(id, [0.3, 0.1 * k, 0], [k, 2, 1], physicsClientId=client)
+    return boxes
+
+
+def _way(client, boxes, contact, steps=12):
+    for _ in range(steps):
+        contact.step()
+    return [(pybullet.getBasePositionAndOrientation(id, client), pybullet.getBaseVelocity(id, client)) for id in boxes]
+
+
+def test_a_restored_state_goes_on_by_the_path_that_it_left_to_the_last_bit(client):
+    boxes = _tumbling(client)
+    with VolumetricContact(Bodies(client)) as contact:
+        _way(client, boxes, contact)
+        first = pybullet.saveState(physicsClientId=client)
+        left = _way(client, boxes, contact)
+        second = pybullet.saveState(client)
+        later = _way(client, boxes, contact)
+        assert len(contact)
+        for state, expected in ((first, left), (second, later), (first, left)):
+            pybullet.restoreState(state, physicsClientId=client)
+            assert _way(client, boxes, contact) == expected
+        # A state that is saved right after another one was restored knows what that one knew.
+        pybullet.restoreState(second, physicsClientId=client)
+        third = pybullet.saveState(client)
+        _way(client, boxes, contact, steps=3)
+        pybullet.restoreState(third, physicsClientId=client)
+        assert _way(client, boxes, contact) == later
+
+
+def test_forces_begin_anew_where_a_restored_state_has_other_masses_or_was_removed_or_comes_from_a_file(
+    client, tmp_path
+):
+    boxes, file = _tumbling(client), str(tmp_path / "state.bullet")
+    with VolumetricContact(Bodies(client)) as contact:
+        _way(client, boxes, contact, steps=24)
+        state = pybullet.saveState(client)
+        pybullet.saveBullet(file, client)
+        left = _way(client, boxes, contact)
+        for _ in range(2):
+            pybullet.restoreState(fileName=file, physicsClientId=client)
+            anew = _way(client, boxes, contact)
+            assert anew != left
+            np.testing.assert_allclose(anew[0][0][0], left[0][0][0], atol=1e-3)
+        pybullet.changeDynamics(boxes[0], -1, mass=3, physicsClientId=client)
+        pybullet.restoreState(state, physicsClientId=client)
+        heavy = _way(client, boxes, contact)
+        pybullet.restoreState(state, physicsClientId=client)
+        assert _way(client, boxes, contact) == heavy
+        pybullet.removeState(state, client)
+        assert _way(client, boxes, contact) != heavy

@@ -71,6 +71,8 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("userConstraintUniqueId", "jointChildPivot", "jointChildFrameOrientation", "maxForce", "gearRatio"),
         *("gearAuxLink", "relativePositionTarget", "erp", "physicsClientId"),
     ),
+    "saveState": ("physicsClientId",),
+    "removeState": ("stateUniqueId", "physicsClientId"),
     "restoreState": ("stateId", "fileName", "physicsClientId"),
     "loadBullet": ("bulletFileName", "physicsClientId"),
     "removeBody": ("bodyUniqueId", "physicsClientId"),

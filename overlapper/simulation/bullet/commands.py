@@ -8,6 +8,7 @@ from typing import Any
 import pybullet
 
 from overlapper.simulation.bullet.calls import Arguments, unheard
+from overlapper.simulation.bullet.memory import StateCall
 
 ARRAYS = frozenset({"setJointMotorControlArray", "setJointMotorControlMultiDofArray"})
 MOTORS = ARRAYS | {"setJointMotorControl2", "setJointMotorControlMultiDof"}
@@ -33,8 +34,8 @@ class Commands:
 
     def __init__(self, client: int) -> None:
         self._client = client
-        self.restored = 0
-        """How often a saved state of the bodies was restored."""
+        self.states: list[StateCall] = []
+        """The calls about saved states of the bodies."""
         self._lasting: dict[Any, Command] = {}  # by body and joint, or by constraint, in the order of the calls
         self._momentary: list[Command] = []
         self._length = 0.0  # of the steps for which the lasting commands were last repeated
@@ -77,11 +78,16 @@ class Commands:
             # The body or the constraint is gone.
             self._lasting = {key: each for key, each in self._lasting.items() if each[1] is not kept}
 
-    def hear(self, name: str, arguments: Arguments, _: Any) -> None:
+    def hear(self, name: str, arguments: Arguments, result: Any) -> None:
         """A listener of calls."""
         if arguments.get("physicsClientId", 0) != self._client:
             return
-        self.restored += name == "restoreState"
+        if name == "saveState":
+            self.states.append(("saved", result))
+        elif name == "restoreState":
+            self.states.append(("restored", arguments.get("stateId")))
+        elif name == "removeState":
+            self.states.append(("removed", arguments["stateUniqueId"]))
         if name not in COMMANDS:
             return
         # The script may change its lists later.

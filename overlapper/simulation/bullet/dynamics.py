@@ -22,6 +22,8 @@ JOINTS = {"held": (0, 0), "planar": (0, 0), "revolute": (1, 1), "prismatic": (2,
 MASS, FRICTION, INERTIA = 0, 1, 2  # of getDynamicsInfo
 HELD = (-1, 0, np.zeros(3), np.zeros(3))  # a base: no parent, no joint
 
+Known = tuple[list[Any], _core.ContactSolver]
+
 
 class BulletDynamics:
     """See `Dynamics`: the links of some bodies, base by base, and the `solver` that knows their masses and joints.
@@ -47,6 +49,18 @@ class BulletDynamics:
             return False
         self._masses = masses
         self._model()
+        return True
+
+    def known(self) -> Known:
+        """The masses, and a solver that has the last forces."""
+        return self._masses, self.solver.copy()
+
+    def resume(self, known: Known) -> bool:
+        """Go on with these last forces. False if masses have changed since, as the forces are then of no use."""
+        masses, solver = known
+        if masses is not self._masses:
+            return False
+        self.solver = solver.copy()
         return True
 
     def friction(self, pairs: NDArray[np.int64]) -> Array:

@@ -10,7 +10,9 @@ import pybullet
 from overlapper.simulation.bullet.calls import listen, replace_steps, tell, unheard, unlisten
 from overlapper.simulation.bullet.commands import Commands
 from overlapper.simulation.bullet.dynamics import BulletDynamics
+from overlapper.simulation.bullet.memory import Memory
 from overlapper.simulation.bullet.recorder import Recorder
+from overlapper.simulation.mechanics import OtherForces
 from overlapper.simulation.model import LinkKey
 
 
@@ -32,14 +34,15 @@ class Stepping:
     def __init__(self, client: int, recorder: Recorder | None) -> None:
         self._client, self._recorder = client, recorder
         self._commands = recorder.commands if recorder else Commands(client)
+        self._memory = Memory(self._commands.states)
         self._response = Response(client)
 
-    @property
-    def restored(self) -> int:
-        return self._commands.restored
-
     def dynamics(self, bodies: Sequence[int]) -> BulletDynamics:
-        return BulletDynamics(self._client, bodies)
+        self._dynamics = BulletDynamics(self._client, bodies)
+        return self._dynamics
+
+    def resumed(self, others: OtherForces) -> OtherForces | None:
+        return self._memory.follow(self._dynamics, others)
 
     def enter(
         self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None], step: Callable[[], None]

@@ -95,7 +95,9 @@ class VolumetricContact:
     assumed to be as in the substep before. Within the `with`, the script's commands to motors and constraints and the
     forces that it applies are given again in each substep. So they last for the whole step, though pybullet keeps them
     as impulses. Gains of motors are those of a whole step, too. A motor that was commanded before the `with` is
-    stronger by the number of substeps, unless a recorder knows the command.
+    stronger by the number of substeps, unless a recorder knows the command. After `restoreState`, bodies move as they
+    did after `saveState`, to the last bit, if both are called within the `with`. For a state in a file, or for other
+    masses than at that time, the solver begins anew.
 
     In MuJoCo, all other forces are known, because MuJoCo computes them first. Its contacts can only be turned off for
     all pairs at once, so `pairs` must contain all pairs that it lets collide. The flag belongs to the model: other data
@@ -353,10 +355,13 @@ class VolumetricContact:
         """Read which bodies have come or gone, and the masses."""
         self._unasked = None
         self.bodies.update()
-        if self._masses.are_stale():
-            self._model()
-        elif self._masses.dynamics.read():
+        if not self._masses.are_stale() and self._masses.dynamics.read():
             self._others = self._masses.dynamics.other_forces()
+        others = self._mechanics.resumed(self._others)
+        if others is None or self._masses.are_stale():
+            self._model()
+        else:
+            self._others = others
         if self._inside and self._rules is not self.bodies.rules:
             # A script may have let pairs collide since, or made new ones.
             self._rules = self.bodies.rules

@@ -19,18 +19,18 @@ from overlapper.simulation.model import Array
 class Masses:
     """The masses and joints of the bodies that exist.
 
-    They are stale if bodies have come or gone since, or if the state of the simulation was restored.
+    They are stale if bodies have come or gone since.
     """
 
     def __init__(self, bodies: AnyBodies, mechanics: Mechanics, layers: Layers) -> None:
-        self._bodies, self._mechanics, self._layers = bodies, mechanics, layers
-        self.keys, self._restored = bodies.keys, mechanics.restored
+        self._bodies, self._layers = bodies, layers
+        self.keys = bodies.keys
         self.dynamics = mechanics.dynamics(sorted({body for body, _, _ in self.keys}))
         self._links = np.array([self.dynamics.place[body, link] for body, link, _ in self.keys], dtype=np.int64)
         self._batch = Batch(bodies.shapes)  # for what is not yet: the one of `bodies` knows what is
 
     def are_stale(self) -> bool:
-        return self.keys is not self._bodies.keys or self._restored != self._mechanics.restored
+        return self.keys is not self._bodies.keys
 
     def stiffness(self, found: Overlaps) -> Array:
         """(p,) the stiffness of each row in Pa/m."""

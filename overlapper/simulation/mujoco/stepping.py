@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from overlapper.printable import printable
+from overlapper.simulation.mechanics import OtherForces
 from overlapper.simulation.model import Array, LinkKey
 from overlapper.simulation.mujoco.calls import stepped, unheard
 from overlapper.simulation.mujoco.dynamics import MujocoDynamics
@@ -46,8 +47,6 @@ class MujocoStepping:
     except contacts, now.
     """
 
-    restored = 0  # a restored state is the state of `data`, and nothing else is kept
-
     def __init__(self, model: Any, data: Any) -> None:
         self.model, self.data = model, data
         self.length = float(model.opt.timestep)
@@ -63,6 +62,9 @@ class MujocoStepping:
 
     def dynamics(self, bodies: Sequence[int]) -> MujocoDynamics:
         return MujocoDynamics(self, bodies)
+
+    def resumed(self, others: OtherForces) -> OtherForces:
+        return others  # they follow from the state of `data`
 
     def enter(
         self, pairs: Iterable[tuple[LinkKey, LinkKey]], answer: Callable[[], None], step: Callable[[], None]
