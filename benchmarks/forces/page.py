@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from forces import cost, physics
+from forces import cost, firsttry, physics
 from forces.cost import PARTS, PILE
 from forces.physics import LAWS
 from harness import charts, results
@@ -193,9 +193,31 @@ def cost_table(path: Path) -> str:
     return f"{said}\n\n{fill(told, 130)}\n\n    {note}"
 
 
+def firsttry_parts(path: Path) -> dict[str, str]:
+    """The table of common scenes, and how many of them end as Bullet's do."""
+    (note,), rows = results.read(path)
+    lines, verdicts = [], []
+    for bullet, ours in zip(rows[::2], rows[1::2]):
+        verdicts.append(firsttry.verdict(bullet, ours))
+        resting = [str(firsttry.resting(row).sum()) if int(row["finite"]) else "" for row in (bullet, ours)]
+        ms = [f"{float(row['ms']):.2g}" if row["ms"] else "" for row in (bullet, ours)]
+        lines.append([bullet["scene"].replace("_", " "), verdicts[-1], *resting, ours["substeps"], *ms])
+    told = (
+        f"**{verdicts.count(firsttry.SAME)} of {len(verdicts)}** scenes end as Bullet's do. The others are named with "
+        "what differs. *Resting* counts the bodies at rest, with the floor. *ms* is the processor's time for a step of "
+        "1/240 s, which volumetric contact divides into the given number of substeps."
+    )
+    heading = ["scene", "end", "resting, Bullet", "ours", "substeps", "ms, Bullet", "ours"]
+    return {
+        "firsttry": f"{table(heading, lines, left=2)}\n\n    {note}",
+        "firsttry_told": fill(told, 130),
+    }
+
+
 def write_page(path: Path, folder: Path) -> Path:
     """forces.md, with its pictures, from the figures or times in `path` and the others of the checkout."""
-    laws, times = (path if path.name == each.name else each for each in (physics.RESULTS, cost.RESULTS))
+    measured = (physics.RESULTS, cost.RESULTS, firsttry.RESULTS)
+    laws, times, tries = (path if path.name == each.name else each for each in measured)
     of = Figures.read(laws)
     for name, panels_of in (("energy", energy_panels), ("friction", friction_panels)):
         panels = panels_of(of)
@@ -211,6 +233,7 @@ def write_page(path: Path, folder: Path) -> Path:
         results=named(laws),
         table=physics_table(of),
         cost=cost_table(times),
+        **firsttry_parts(tries),
         face_1=f"{100 * face['1']:.0f}",
         face_4=f"{100 * face['4']:.1f}",
         face_16=f"{100 * face['16']:.2f}",

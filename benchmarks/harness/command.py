@@ -25,6 +25,7 @@ COMMANDS = {
     "stress": "stability.stress",
     "physics": "forces.physics",
     "forces": "forces.cost",
+    "firsttry": "forces.firsttry",
     "boxes": "boxes.iou",
     "audit": "costs.audit",
     "concave": "costs.concave",

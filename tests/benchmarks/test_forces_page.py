@@ -13,7 +13,7 @@ from overlapper.simulation import Bodies
 def test_the_page_is_what_was_measured(tmp_path):
     page = forces_page.write_page(tmp_path / cost.RESULTS.name, tmp_path).read_text(encoding="utf-8")
     assert "$" not in page and "They were not measured yet." in page
-    assert page.count("\n| ") == 25
+    assert page.count("\n| ") == 62
     for name in ("energy", "friction"):
         assert (tmp_path / f"forces_{name}.png").stat().st_size > 10_000
 

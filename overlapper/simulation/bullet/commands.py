@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from typing import Any
+from typing import Any, Literal
 
 import pybullet
 
 from overlapper.simulation.bullet.calls import Arguments, unheard
-from overlapper.simulation.bullet.memory import StateCall
 
 ARRAYS = frozenset({"setJointMotorControlArray", "setJointMotorControlMultiDofArray"})
 MOTORS = ARRAYS | {"setJointMotorControl2", "setJointMotorControlMultiDof"}
@@ -22,6 +21,9 @@ DEFAULT_GAINS = {"positionGain": 0.1, "velocityGain": 1.0}
 MAX_FORCE, DEFAULT_MAX_FORCE = 10, 500.0  # of getConstraintInfo
 
 Command = tuple[str, Arguments]
+
+StateCall = tuple[Literal["saved", "restored", "removed"], int | None]
+"""What a call of the script did to a state, and the number of the state. States in files have no number."""
 
 
 class Commands:

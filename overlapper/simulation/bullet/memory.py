@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
+from overlapper.simulation.bullet.commands import StateCall
 from overlapper.simulation.bullet.dynamics import BulletDynamics, Known
 from overlapper.simulation.mechanics import OtherForces
-
-StateCall = tuple[Literal["saved", "restored", "removed"], int | None]
-"""What a call of the script did to a state, and the number of the state. States in files have no number."""
 
 
 class _Kept(NamedTuple):
