@@ -117,7 +117,7 @@ class Scene:
         self.client = p.connect(p.DIRECT)
         stack.callback(p.disconnect, self.client)
         build(self.client)
-        self.contact = stack.enter_context(VolumetricContact(Bodies(self.client)))
+        self.contact = stack.enter_context(VolumetricContact(Bodies(self.client), dissipation=1e-3))
         self.taken: dict[str, list[float]] = {}
         self.deepest = 0.0
 

@@ -545,7 +545,7 @@ def test_forces_of_the_script_replace_ours_until_the_next_step():
     """Rows of xfrc_applied that the script writes are the script's. All others are as it has left them."""
     model, data = simulated(free(CUBE, f"0 0 {HALF - G / 1e5}") + free(CUBE, f"1 0 {HALF - G / 1e5}"))
     data.xfrc_applied[1] = data.xfrc_applied[2] = 0, 0, -1, 0, 0, 0
-    with pressing(model, data):
+    with pressing(model, data, dissipation=1e-3):
         mujoco.mj_step(model, data)
         assert data.xfrc_applied[:, 2] == pytest.approx([0, G - 1, G - 1], abs=0.2)  # with those of contacts
         data.xfrc_applied[2] = 0, 0, -3, 0, 0, 0

@@ -71,10 +71,10 @@ class World:
             )
 
     def contact(self, law="volumetric", substeps: Any = "auto", **parameters: Any) -> Any:
-        """Bullet's takes so many substeps, too, of "auto" one."""
+        """Bullet's takes so many substeps, too, of "auto" one. Dissipation is 1 ms if it is not given."""
         if law == "bullet":
             return BulletContact(self, 1 if substeps == "auto" else substeps)
-        return VolumetricContact(Bodies(self.client), substeps=substeps, **parameters)
+        return VolumetricContact(Bodies(self.client), substeps=substeps, **{"dissipation": 1e-3} | parameters)
 
     def position(self, id: int) -> np.ndarray:
         return np.array(p.getBasePositionAndOrientation(id, self.client)[0])
@@ -167,7 +167,7 @@ def bounce(pose: str, substeps: int, law="volumetric", phases=5, drop=0.05, stif
     return worst
 
 
-def restitution(dissipation: float, drop=0.5, substeps=32, stiffness=1e7) -> float:
+def restitution(dissipation: float | None, drop=0.5, substeps=32, stiffness=1e7) -> float:
     """The speed of a cube after a bounce on its face, over that before: both where it is 1 mm high."""
     with World() as world:
         cube = world.box(*[HALF] * 3, position=[0, 0, HALF + drop])
@@ -322,7 +322,15 @@ def rigid_slide_and_spin(shape: str, speed=1.0, spin=20.0, nodes=40, steps=4000)
     return Motion(float(np.hypot(*state[:2])), float(state[2]), time)
 
 
-def roll(shape: str, law="volumetric", stiffness=1e7, substeps: Any = 4, dissipation=0.0, seconds=1.0, radius=HALF):
+def roll(
+    shape: str,
+    law="volumetric",
+    stiffness=1e7,
+    substeps: Any = 4,
+    dissipation: float | None = 0.0,
+    seconds=1.0,
+    radius=HALF,
+):
     """A cylinder or a ball that has begun to roll at 1 m/s: speeds (m/s) and kinetic energies (J), now and then."""
     with World() as world:
         turned = p.getQuaternionFromEuler([math.pi / 2, 0, 0])

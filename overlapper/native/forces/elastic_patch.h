@@ -16,6 +16,7 @@ struct ElasticPatch {
   double force = 0;          ///< N, at rest
   double stiffness = 0;      ///< Pa/m
   double dissipation = 0;    ///< s
+  double damping = 0;        ///< damping ratio of motion along the normal, besides the dissipation
   double friction = 0;       ///< coefficient of friction
   double area = 0;           ///< m²; 0 for a patch without a direction, whose force does not depend on the depth
   Vec3 centre;               ///< m, of this area

@@ -71,7 +71,8 @@ Pose to_pose(nb::handle given) {
 }
 
 nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps& found, nb::handle links_given,
-                 nb::handle stiffness_given, nb::handle dissipation_given, nb::handle friction_given) {
+                 nb::handle stiffness_given, nb::handle dissipation_given, nb::handle friction_given,
+                 nb::handle damping_given) {
   std::vector<Pose> frames;
   for (nb::handle each : frames_given) frames.push_back(to_pose(each));
   const size_t count = found.size(), links = size_t(solver.bodies().links());
@@ -80,6 +81,8 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
   const auto stiffness = numbers(stiffness_given, "stiffness", count);
   const auto dissipation = numbers(dissipation_given, "dissipation", count);
   const auto friction = numbers(friction_given, "friction", count);
+  std::vector<double> damping(count);
+  if (!damping_given.is_none()) damping = numbers(damping_given, "damping", count);
   const auto& [centre, moments, distance] = unlocked([&]() -> const Overlaps::Patches& { return found.patches(); });
   std::vector<ElasticPatch> patches(count);
   for (size_t i = 0; i < count; ++i) {
@@ -91,7 +94,8 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
     patch.key = std::int64_t(a) << 32 | b;
     patch.link_a = int(link_of[a]), patch.link_b = int(link_of[b]);
     patch.normal = found.normal[i];
-    patch.stiffness = stiffness[i], patch.dissipation = dissipation[i], patch.friction = friction[i];
+    patch.stiffness = stiffness[i], patch.dissipation = dissipation[i];
+    patch.damping = damping[i], patch.friction = friction[i];
     if (found.status[i] != std::int8_t(Status::kOverlapping)) continue;
     patch.force = stiffness[i] * found.volume[i];
     patch.centroid = found.centroid[i];
@@ -219,13 +223,17 @@ numbers for the coordinates of its tree; w is the size of the largest tree.)");
       "Another one that knows the same of the last step: what it solves changes nothing here.");
   cls.def(
       "place", &place, "frames"_a, "overlaps"_a, "links"_a, "stiffness"_a, "dissipation"_a, "friction"_a,
-      nb::sig("def place(self, frames: collections.abc.Sequence[typing.Any], overlaps: Overlaps, links: "
-              "numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: "
-              "numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]"),
+      "damping"_a.none() = nb::none(),
+      nb::sig(
+          "def place(self, frames: collections.abc.Sequence[typing.Any], overlaps: Overlaps, links: "
+          "numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: "
+          "numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike, damping: numpy.typing.ArrayLike | None = None) "
+          "-> numpy.typing.NDArray[numpy.float64]"),
       R"(Put the links where they are, and take what their shapes share; `links` (k,) is the place of each shape's link.
 
 `frames` begin with position and quaternion of the inertial frame, as pybullet's answers do. By row of `overlaps` (p,):
-stiffness in Pa/m, dissipation in s, and the coefficient of friction. The answer (p,) is the square of a frequency,
+stiffness in Pa/m, dissipation in s, the coefficient of friction, and the damping ratio along the normal, which is 0
+if it is not given. The answer (p,) is the square of a frequency,
 (rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.)");
   cls.def(
       "ahead", &ahead, "duration"_a, "velocity"_a, "links"_a, "positions"_a, "orientations"_a,

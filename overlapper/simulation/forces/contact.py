@@ -42,9 +42,11 @@ class VolumetricContact:
     stiffness : float or callable, default 1e7
         Pressure for each metre of depth, Pa/m. A layer of thickness t and modulus E has the stiffness E / t. Two bodies
         in series have 1 / (1 / k1 + 1 / k2).
-    dissipation : float or callable, default 0.001
+    dissipation : float or callable, optional
         Time in s by which pressures are ahead of the depth (Kelvin and Voigt). The damping ratio of an oscillation of
-        angular frequency w is w * dissipation / 2. A dissipation of 0 keeps the energy.
+        angular frequency w is w * dissipation / 2. A dissipation of 0 keeps the energy. Default: 0.001, and besides
+        critical damping of the motion along the normal of each patch. Bodies then hardly bounce, as in pybullet, where
+        restitution is 0 by default. This damping does not resist what rolls.
     friction : float, callable or 'distributed', optional
         Coulomb's coefficient. Default: that of the simulator. In pybullet it is the product of the two links'
         lateralFriction, in MuJoCo the sliding friction of the two geoms. With "distributed", friction acts at points
@@ -121,7 +123,7 @@ class VolumetricContact:
         bodies: AnyBodies,
         pairs: Among | None = None,
         stiffness: float | OfPair = 1e7,
-        dissipation: float | OfPair = 1e-3,
+        dissipation: float | OfPair | None = None,
         friction: float | OfPair | Literal["distributed"] | None = None,
         substeps: int | Literal["auto"] = "auto",
     ) -> None:
@@ -211,7 +213,8 @@ class VolumetricContact:
     def forces(self) -> Forces:
         """The forces at the beginning of a step, without taking the step.
 
-        It is meant for scripts that integrate by themselves.
+        It is meant for scripts that integrate by themselves. Such scripts should give a dissipation. The default
+        damping is too strong for an explicit step of the whole length.
 
         Returns
         -------

@@ -15,6 +15,9 @@ from overlapper.simulation.model import Array, LinkKey
 OfPair = Callable[[LinkKey, LinkKey], float]
 """The value for a pair of links ((body, link), (body, link)), the lesser first."""
 
+# If no dissipation is given: it resists what rolls by little, and motion along the normal is damped besides.
+DISSIPATION, DAMPING = 1e-3, 1.0
+
 
 class Layers:
     """The elastic layers of the bodies: stiffness, dissipation and friction, as `VolumetricContact` takes them.
@@ -25,24 +28,26 @@ class Layers:
     def __init__(
         self,
         stiffness: float | OfPair,
-        dissipation: float | OfPair,
+        dissipation: float | OfPair | None,
         friction: float | OfPair | Literal["distributed"] | None,
     ) -> None:
         self.distributed = isinstance(friction, str) and friction == "distributed"
         self._stiffness = Parameter("stiffness", stiffness, "Pa/m", positive=True)
-        self._dissipation = Parameter("dissipation", dissipation, "s")
+        self._dissipation = Parameter("dissipation", DISSIPATION if dissipation is None else dissipation, "s")
+        self._damping = DAMPING if dissipation is None else 0.0
         self._friction = None
         if friction is not None and not self.distributed:
             self._friction = Parameter("friction", friction, "")  # type: ignore[arg-type]  # no other text is a number
 
-    def of(self, pairs: NDArray[np.int64], dynamics: Dynamics) -> tuple[Array, Array, Array]:
-        """Return stiffness, dissipation and coefficient of friction, each (p,).
+    def of(self, pairs: NDArray[np.int64], dynamics: Dynamics) -> tuple[Array, Array, Array, Array]:
+        """Return stiffness, dissipation, coefficient of friction and damping ratio along the normal, each (p,).
 
         `pairs` (p, 2) are pairs of indices in `dynamics.links`.
         """
         links = dynamics.links
         friction = self._friction.of(pairs, links) if self._friction else dynamics.friction(pairs)
-        return self._stiffness.of(pairs, links), self._dissipation.of(pairs, links), friction
+        damping = np.full(len(pairs), self._damping)
+        return self._stiffness.of(pairs, links), self._dissipation.of(pairs, links), friction, damping
 
 
 class Parameter:
