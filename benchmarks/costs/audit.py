@@ -2,6 +2,7 @@
 
     python benchmarks audit speed [ROUNDS]           configurations a second of a Franka, on one core
     python benchmarks audit robots [CONFIGURATIONS]  the table of docs/audit.md
+    python benchmarks audit proofs [BOXES]           the table of proofs of docs/audit.md
 
 The first needs `pip install pin`, which is pinocchio with coal. Both sides have the same convex shapes: those that
 pybullet has made. Ours looks at blocks as in an audit, with volumes and depths; theirs says yes or no for the same
@@ -15,6 +16,7 @@ from argparse import ArgumentParser, Namespace
 from importlib.metadata import distribution
 from pathlib import Path
 from statistics import median
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -131,12 +133,51 @@ def row_of(path: Path, count: int) -> list[str]:
     return list(map(str, cells))
 
 
-WHAT = {"speed": speed, "robots": robots}
+PROVED = [
+    "panda",
+    "ur5_robot",
+    "ur10_robot",
+    "kinova",
+    "xarm7",
+    "z1",
+    "so101",
+    "solo",
+    "talos_left_arm",
+    "go2",
+]
+
+
+def proofs(limit: int = 20_000) -> None:
+    """A row for each of ten robots: what sampling says beside what is proved, and the check of the covers."""
+    heading = ["robot", "joints", "pairs", "sampled never", "proved never", "overlap", "open", "largest open share"]
+    heading += ["proof s", "check s", "refused"]
+    print(table(heading, (proofs_of(name, limit) for name in PROVED)))
+
+
+def proofs_of(name: str, limit: int) -> list[str]:
+    from overlapper.audit.cover_file import verify, write_covers
+    from overlapper.audit.prove import prove
+
+    robot = read_robot(next(ROBOTS.rglob(f"{name}.urdf")))
+    sampled = audit(robot, 10_000)
+    found, checked = [], []
+    seconds = timed(lambda: found.extend(prove(sampled, limit)))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "covers.npz"
+        write_covers(robot, found, path)
+        check = timed(lambda: checked.extend(verify(robot, path)))
+    counts = [sum(each.verdict == verdict for each in found) for verdict in ("never", "overlaps", "open")]
+    share = max((each.open_share for each in found if each.verdict == "open"), default=0.0)
+    cells = [name, len(robot.degrees), len(found), len(sampled.of_status("never")), *counts, f"{100 * share:.3g} %"]
+    return list(map(str, [*cells, f"{seconds:.1f}", f"{check:.1f}", sum(bool(each.wrong) for each in checked)]))
+
+
+WHAT = {"speed": speed, "robots": robots, "proofs": proofs}
 
 
 def options(parser: ArgumentParser) -> None:
     parser.add_argument("what", choices=WHAT)
-    parser.add_argument("number", nargs="?", type=int, help="of rounds or configurations")
+    parser.add_argument("number", nargs="?", type=int, help="of rounds, configurations or boxes")
 
 
 def main(chosen: Namespace) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import reduce
 from operator import add
 from typing import Literal
@@ -12,6 +12,7 @@ from typing import Literal
 from overlapper import Batch, Overlaps
 from overlapper.audit.examiner import Examiner
 from overlapper.audit.pairs import LinkPair
+from overlapper.audit.proofs import Proof
 from overlapper.audit.robot import Robot, shape_keys
 from overlapper.audit.sampling import Sampling
 from overlapper.audit.tally import Array, Tally
@@ -61,11 +62,15 @@ class PairAudit:
 
 @dataclass(frozen=True, slots=True)
 class Audit:
-    """A robot, its sampled configurations, and the pairs of links that have shapes, in their order."""
+    """A robot, its sampled configurations, and the pairs of links that have shapes, in their order.
+
+    `proofs` has the answers of `overlapper.audit.prove.prove`, by the links of a pair, if they were asked for.
+    """
 
     robot: Robot
     sampling: Sampling
     pairs: list[PairAudit]
+    proofs: Mapping[tuple[int, int], Proof] = field(default_factory=dict)
 
     def of_status(self, status: Status, adjacent: bool = False) -> list[PairAudit]:
         return [each for each in self.pairs if each.status == status and each.pair.adjacent == adjacent]

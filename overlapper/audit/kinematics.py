@@ -26,10 +26,10 @@ class Kinematics:
         names = {link.joint.name: place for place, link in enumerate(self._links)}
         columns = {degree.link: degree.column for degree in robot.degrees}
         # By link: the column that moves its joint, with multiplier and offset; -1 where the joint's leader stays at 0.
-        self._driven = {place: (column, 1.0, 0.0) for place, column in columns.items()}
+        self.driven = {place: (column, 1.0, 0.0) for place, column in columns.items()}
         for name, mimic in robot.mimics.items():
             column = columns.get(names[mimic.leader], -1)
-            self._driven[names[name]] = column, mimic.multiplier, mimic.offset
+            self.driven[names[name]] = column, mimic.multiplier, mimic.offset
 
     def poses(self, configurations: Array) -> tuple[Array, Array]:
         """Positions (n, k, 3) in m and unit quaternions xyzw (n, k, 4) of the shapes, in the frame of the world.
@@ -54,7 +54,7 @@ class Kinematics:
         for place, link in enumerate(self._links):
             joint = link.joint
             position, orientation, matrix = frames[link.parent] if link.parent >= 0 else world
-            column, multiplier, offset = self._driven.get(place, (-1, 0.0, 0.0))
+            column, multiplier, offset = self.driven.get(place, (-1, 0.0, 0.0))
             value = columns[column] * multiplier + offset if column >= 0 else offset
             pivot = _moved(position, matrix, joint.position)
             turn: Numbers = joint.orientation.tolist()

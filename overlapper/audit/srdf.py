@@ -13,14 +13,24 @@ from overlapper.whole_file import beside
 
 Names = frozenset[str]
 
-REASONS = frozenset({"Adjacent", "Never", "Always", "Default"})
+PROVED = "Never, proved"
+"""The reason of a pair that is proved never to overlap. "Never" is the reason of a pair that was only sampled."""
+
+REASONS = frozenset({"Adjacent", "Never", PROVED, "Always", "Default"})
 """The reasons that MoveIt's assistant and `write_srdf` find out. People give others, such as "User"."""
 
 
-def reason(audited: PairAudit, whole: bool) -> str | None:
-    """Why a pair need not be tested; None if it must be. "Never" requires that both links are modelled `whole`."""
+def reason(audited: PairAudit, whole: bool, verdict: str | None = None) -> str | None:
+    """Why a pair need not be tested; None if it must be. "Never" requires that both links are modelled `whole`.
+
+    `verdict` is that of the pair's proof. A pair that overlaps by its proof alone must be tested.
+    """
     if audited.pair.adjacent:
         return "Adjacent"
+    if verdict == "never":
+        return PROVED
+    if verdict == "overlaps" and audited.status == "never":
+        return None
     if audited.status == "never" and not whole:
         return None
     sometimes = "Default" if audited.at_rest else None
@@ -73,7 +83,8 @@ def _disabled(audit: Audit) -> Iterator[tuple[tuple[str, str], str]]:
     """The pairs that need not be tested, by name, and why."""
     partial = not_modelled(audit.robot).keys()
     for audited in audit.pairs:
-        if why := reason(audited, partial.isdisjoint(audited.names)):
+        proof = audit.proofs.get(audited.pair.links)
+        if why := reason(audited, partial.isdisjoint(audited.names), proof.verdict if proof else None):
             yield audited.names, why
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from contextlib import AbstractContextManager
+from dataclasses import asdict, replace
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 from rich.table import Table
@@ -35,6 +38,7 @@ if TYPE_CHECKING:
     from overlapper.jobs.executor import Executor
 
 LISTED = 20  # pairs at most
+LIMIT = 20_000  # boxes for each pair of links
 CAPTION = (
     "Fraction: share of the random configurations, with its 95 % confidence bounds. Volume: the largest. Depth: the "
     "largest, of the deepest pair of shapes."
@@ -66,6 +70,16 @@ def audit(
         typer.Option(help="Write a table of all pairs of links, or of all assets: .csv, .parquet, .sqlite."),
     ] = None,
     html: HtmlOption = None,
+    prove: Annotated[
+        bool, typer.Option("--prove", help="Prove which pairs never overlap, for all joint positions.")
+    ] = False,
+    limit: Annotated[int, typer.Option(min=1, help="Boxes of joint positions that --prove takes for a pair.")] = LIMIT,
+    cover: Annotated[
+        Path | None, typer.Option(help="Write the proofs of --prove to a file that --verify checks: .npz.")
+    ] = None,
+    verify: Annotated[
+        Path | None, typer.Option(help="Check the proofs of a file without the core, and nothing else.")
+    ] = None,
     engine: AbstractContextManager[Executor],
     tolerance: ToleranceOption = 1e-3,
     modelled: Modelling,
@@ -81,6 +95,10 @@ def audit(
     and are not reported. The exit code is 1 if a pair that is not adjacent always overlaps, if a pair that --against
     disables overlaps, or if a shape is not modelled. It is 2 if the robot cannot be read, else 0.
 
+    --prove adds an answer for all joint positions, for each pair that is not adjacent: never (proved), overlaps (with a
+    configuration), or open. The exit code is then also 1 if a pair is open. With --verify, it is 1 if a proof of the
+    file does not hold.
+
     For a folder of models and meshes, the command reports which files load, which meshes are closed, and what is left
     out and why. It also reports how much volume convex parts add, and which models overlap with themselves at rest.
     The exit code is 1 if anything is reported.
@@ -93,10 +111,15 @@ def audit(
 
     [bold]overlapper audit robot.urdf --against robot.srdf --expect "*finger,*finger"[/bold]  a test for CI
 
+    [bold]overlapper audit robot.urdf --prove --cover proofs.npz[/bold]  for all joint positions
+
+    [bold]overlapper audit robot.urdf --verify proofs.npz[/bold]  checks the proofs again
+
     [bold]overlapper audit assets --units mm[/bold]  a folder of models and meshes
     """
     refuse_tolerance(tolerance)
     refuse_table(out)
+    _refuse_cover(cover, prove)
     pairs = expected_pairs(expect)
     settings: dict[str, Any] = {
         "configurations": configurations,
@@ -107,11 +130,21 @@ def audit(
         "tolerance": tolerance,
         **settings_of(modelled),
     }
+    settings |= {"limit": limit} if prove else {}
     if robot.is_dir():
-        asked = {"--expect": expect, "--against": against, "--srdf": srdf, "--exclude": exclude, "--html": html}
+        asked: dict[str, Any] = {
+            "--expect": expect,
+            "--against": against,
+            "--srdf": srdf,
+            "--exclude": exclude,
+            "--html": html,
+        }
+        asked |= {"--prove": prove, "--cover": cover, "--verify": verify}
         if of_robots := [name for name, value in asked.items() if value]:
             raise Refused(f"{of_robots[0]} needs a robot, but {robot} is a folder")
         audit_folder(robot, units, least_depth, modelled, out, as_json)
+    if verify:
+        _verify(robot, verify, modelled, as_json)
     written: list[Path] = []
     with input_refusals(), quiet():
         from overlapper.audit.allowed import must_name_some
@@ -124,7 +157,8 @@ def audit(
         from overlapper.simulation.bullet.model_file import NotRead
         from overlapper.tables.outputs import can_be_written
 
-        can_be_written(out, html, srdf, exclude)
+        can_be_written(out, html, srdf, exclude, cover)
+        import_module("overlapper.audit.prove" if prove else "overlapper.audit.audit")  # python-flint may be missing
         disabled = read_srdf(against) if against else {}
         try:
             read = read_robot(robot, modelled)
@@ -143,6 +177,8 @@ def audit(
                 working,
                 lambda blocks, count: with_progress(blocks, robot.name, count),
             )
+            if prove:
+                found = _proved(found, limit, least_depth, working)
         if not found.pairs:
             left_out = "".join(f"; {name} is not modelled, because {why}" for name, why in not_modelled(read).items())
             raise Refused(f"{robot} has no two links with shapes that could overlap{left_out}")
@@ -156,12 +192,13 @@ def audit(
         if exclude:
             write_excludes(found, exclude)
             written.append(exclude)
+        written += _write_covers(found, cover)
         if html:
             write_page(found, html)
             written.append(html)
         wrong = findings(found, pairs, disabled)
     if as_json:
-        places = {"out": out, "srdf": srdf, "exclude": exclude, "html": html}
+        places = {"out": out, "srdf": srdf, "exclude": exclude, "html": html, "cover": cover}
         files = {name: str(path) for name, path in places.items() if path}
         about: dict[str, Any] = {"robot": read.name, "joints": list(read.columns), "remarks": remarks(read)}
         about["not_modelled"] = not_modelled(read)
@@ -170,6 +207,56 @@ def audit(
     else:
         _show(found, wrong, written)
     raise typer.Exit(1 if wrong else 0)
+
+
+def _refuse_cover(cover: Path | None, prove: bool) -> None:
+    if cover and not prove:
+        raise Refused("--cover needs --prove")
+    if cover and cover.suffix != ".npz":
+        raise Refused(f"--cover must end in .npz, not {cover.name!r}")
+
+
+def _proved(found: Audit, limit: int, least_depth: float, engine: Executor) -> Audit:
+    """The audit with the answers for all joint positions."""
+    from overlapper.audit.prove import prove
+
+    name = f"proofs of {found.robot.name}"
+    proofs = prove(found, limit, least_depth, engine, lambda proofs, count: with_progress(proofs, name, count))
+    return replace(found, proofs={each.pair.links: each for each in proofs})
+
+
+def _write_covers(found: Audit, cover: Path | None) -> list[Path]:
+    if cover is None:
+        return []
+    from overlapper.audit.cover_file import write_covers
+
+    write_covers(found.robot, found.proofs.values(), cover)
+    return [cover]
+
+
+def _verify(path: Path, cover: Path, modelled: Modelling, as_json: bool) -> NoReturn:
+    """Check the proofs of a file, show what holds, and leave: 1 if a proof does not hold, else 0."""
+    with input_refusals(), quiet():
+        from overlapper.audit.cover_file import verify
+        from overlapper.audit.robot import read_robot
+        from overlapper.simulation.bullet.model_file import NotRead
+
+        try:
+            checked = verify(read_robot(path, modelled), cover)
+        except NotRead as error:
+            raise Refused(str(error)) from error
+    proved = [each for each in checked if not each.wrong and not each.open_share]
+    if as_json:
+        print(json.dumps({"robot": str(path), "cover": str(cover), "pairs": [asdict(each) for each in checked]}))
+    else:
+        for each in checked:
+            names = " and ".join(each.names)
+            if each.wrong:
+                say(f"Refused: {names}, {each.wrong}.")
+            elif each.open_share:
+                say(f"Open: {names}, {100 * each.open_share:.3g} % of the joint positions.")
+        say(f"{len(proved):,} of {len(checked):,} pairs of links in {cover} are proved never to overlap.")
+    raise typer.Exit(0 if len(proved) == len(checked) else 1)
 
 
 def _show(found: Audit, wrong: list[str], written: list[Path]) -> None:
@@ -191,10 +278,26 @@ def _show(found: Audit, wrong: list[str], written: list[Path]) -> None:
         f"Of {len(found.pairs):,} pairs of {links:,} links, {', '.join(words)} in {found.sampling.count:,} "
         "configurations."
     )
+    if found.proofs:
+        _say_proofs(found)
     if left_out:
         say(f"{left_out:,} {'links are' if left_out > 1 else 'link is'} not modelled whole.")
     for line in (*remarks(found.robot), *wrong, *(f"Written: {path}" for path in written)):
         say(line)
+
+
+def _say_proofs(found: Audit) -> None:
+    """How many pairs are proved, overlap or are open, and the configurations of overlaps that no sample had."""
+    verdicts = Counter(proof.verdict for proof in found.proofs.values())
+    say(
+        f"For all joint positions: {verdicts['never']:,} of {len(found.proofs):,} pairs that are not adjacent never "
+        f"overlap (proved), {verdicts['overlaps']:,} overlap, {verdicts['open']:,} are open."
+    )
+    for each in found.pairs:
+        proof = found.proofs.get(each.pair.links)
+        if proof and proof.verdict == "overlaps" and not each.met and proof.values is not None:
+            where = ", ".join(f"{name} {value:.6g}" for name, value in zip(found.robot.columns, proof.values.tolist()))
+            say(f"Overlap that no sample had: {' and '.join(each.names)} at {where}.")
 
 
 def _often(audited: PairAudit) -> float:

@@ -220,3 +220,68 @@ def test_unmoved_joints_and_unmodelled_shapes_are_reported(tmp_path):
         "The prismatic joint slide stays at rest, because it has no limits.",
         "The planar joint table stays at rest, because planar joints are not moved.",
     ]
+
+
+def test_proofs_are_shown_written_and_verified(tmp_path):
+    arm = urdf(
+        tmp_path / "arm.urdf",
+        link("base", ("0.2 0.2 0.2", "0 0 0")),
+        link("upper", ("0.2 0.2 0.2", "0.5 0 0")),
+        link("lower", ("0.2 0.2 0.2", "1 0 0")),
+        joint("shoulder", "revolute", "base", "upper", limit(-1, 1)),
+        joint("elbow", "revolute", "upper", "lower", limit(-2, 2), xyz="1 0 0"),
+    )
+    code, said, complaints = run(arm, "--prove", "--cover", "proofs.npz", "--srdf", "arm.srdf")
+    assert (code, complaints) == (0, "")
+    assert "For all joint positions: 1 of 1 pairs that are not adjacent never overlap (proved), 0 overlap" in said
+    assert read_srdf(tmp_path / "arm.srdf")[frozenset(("base", "lower"))] == "Never, proved"
+    code, said, _ = run(arm, "--verify", "proofs.npz")
+    assert (code, said) == (0, "1 of 1 pairs of links in proofs.npz are proved never to overlap.\n")
+    code, said, _ = run(arm, "--prove", "--limit", 1, "--json", "--cover", "open.npz")
+    found = json.loads(said)
+    (row,) = (each for each in found["pairs"] if each["proof"])
+    assert (code, row["proof"], row["proof_open"], found["settings"]["limit"]) == (1, "open", 1.0, 1)
+    assert found["findings"][0].startswith("Open: base and lower, 100 % of the joint positions")
+    assert found["cover"] == "open.npz"
+    code, said, _ = run(arm, "--verify", "open.npz")
+    assert (code, said.splitlines()[0]) == (1, "Open: base and lower, 100 % of the joint positions.")
+
+
+def test_a_refused_proof_is_an_exit_code(robot, tmp_path):
+    assert run(robot, "--prove", "--cover", "proofs.npz")[0] == 1  # the plate is always in the wall
+    other = robot.read_text().replace('xyz="0 0 0.27"', 'xyz="0 0 0.1"')
+    robot.write_text(other)
+    code, said, _ = run(robot, "--verify", "proofs.npz", "--json")
+    pairs = {tuple(each["names"]): each["wrong"] for each in json.loads(said)["pairs"]}
+    assert code == 1 and "too small" in pairs["disc", "plate"] and not pairs["post", "arm"]
+    code, said, _ = run(robot, "--verify", "proofs.npz")
+    assert code == 1 and "Refused: disc and plate, the room along the axis of a box is too small" in said
+
+
+def test_an_overlap_that_only_the_proof_found_is_said(tmp_path):
+    arm = urdf(
+        tmp_path / "arm.urdf",
+        link("base", ("0.001 0.001 0.001", "0 0 0")),
+        link("upper", ("0.2 0.2 0.2", "0.5 0 0")),
+        link("lower", ("0.001 0.001 0.001", "1 0 0")),
+        joint("shoulder", "revolute", "base", "upper", limit(-0.1, 0.1)),
+        joint("elbow", "revolute", "upper", "lower", limit(-4, 4), xyz="1 0 0"),
+    )
+    code, said, _ = run(arm, "--prove", "--configurations", 1)
+    assert code == 0 and "Overlap that no sample had: base and lower at shoulder " in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["table.urdf", "--cover", "proofs.npz"], "--cover needs --prove"),
+        (["table.urdf", "--prove", "--cover", "proofs.json"], "--cover must end in .npz, not 'proofs.json'"),
+        ([".", "--prove"], "--prove needs a robot, but . is a folder"),
+        (["table.urdf", "--verify", "table.urdf"], "table.urdf is not a file of covers"),
+        (["table.urdf", "--verify", "none.npz"], "none.npz: No such file or directory"),
+        (["none.urdf", "--verify", "none.npz"], "there is no file none.urdf"),
+    ],
+)
+def test_wrong_requests_for_proofs_are_refused(arguments, sentence):
+    code, _, complaints = run(*arguments)
+    assert code == 2 and sentence in complaints
