@@ -174,6 +174,14 @@ def test_a_rounded_hull_lies_between_its_core_and_a_larger_hull():
         assert core.volume < found[0].volume < found[1].volume < found[2].volume
 
 
+def test_a_core_whose_faces_touch_the_ellipsoid_takes_no_longer():
+    a = Placed(Ellipsoid([0.5, 1, 0.25]), (0, 0, 0), (5e-14, -2e-13, -3e-14, 1))
+    cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    found = overlap(a, Placed(RoundedHull(cube, 0.1), (0.25, 0, 0.25), (1, 1, 1, 1)))
+    assert found.volume == pytest.approx(a.shape.volume, rel=1e-12)
+    assert found.area == pytest.approx(overlap(a, Placed(Hull(3 * cube))).area, rel=1e-9)
+
+
 def test_one_inside_the_other_is_the_whole_inner_one():
     big, small = (
         Placed(Ellipsoid([3, 4, 5]), (1, 1, 1), (1, 2, 3, 4)),

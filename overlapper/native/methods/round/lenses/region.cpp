@@ -141,14 +141,21 @@ std::array<double, 7> through_crossing(const Scaled& of) {
   return result;
 }
 
-/// The line in which two walls meet, along t. No value if both are nearly parallel in the slices.
-std::optional<Line> meeting(const Cut& a, const Cut& b) {
-  const double both = cross(a.normal, b.normal);
-  if (!(std::abs(both) > 1e-9 * a.length * b.length)) return std::nullopt;
-  const auto at = [&](double of_a, double of_b) {
-    return (1 / both) * Flat{of_a * b.normal.y - of_b * a.normal.y, of_b * a.normal.x - of_a * b.normal.x};
+/// The side of a wall by u, for its unit normal.
+std::array<double, 2> side_by(const Scaled& of, const Cut& cut) {
+  return {cut.side(of.start) / cut.length, -cut.rate * of.step / cut.length};
+}
+
+/// The line in which two walls meet, along u. No value if both are nearly parallel in the slices.
+std::optional<Line> meeting(const Scaled& of, const Cut& one, const Cut& other) {
+  const Flat a = (1 / one.length) * one.normal, b = (1 / other.length) * other.normal;
+  const double both = cross(a, b);
+  if (!(std::abs(both) > 1e-9)) return std::nullopt;
+  const auto of_a = side_by(of, one), of_b = side_by(of, other);
+  const auto at = [&](size_t i) {
+    return (1 / both) * Flat{of_a[i] * b.y - of_b[i] * a.y, of_b[i] * a.x - of_a[i] * b.x};
   };
-  return Line{at(a.offset, b.offset), at(-a.rate, -b.rate)};
+  return Line{at(0), at(1)};
 }
 
 /// Collects the values of t that matter: their points are not clearly outside another wall or a disc.
@@ -159,12 +166,18 @@ class WallChanges {
 
   void run() {
     for (int i = 0; i < discs_.cuts; ++i) {
-      const Scaled of(discs_, discs_.cut[i], low_, high_);
+      const Cut& cut = discs_.cut[i];
+      const Scaled of(discs_, cut, low_, high_);
       if (!(of.low < of.high)) continue;
       for (const int k : {0, 1}) add_touching(of, i, k);
       add_crossings(of);
-      for (int j = 0; j < i; ++j)
-        if (const auto line = meeting(discs_.cut[i], discs_.cut[j])) add_edge(i, j, *line);
+      for (int j = 0; j < discs_.cuts; ++j) {
+        const Cut& other = discs_.cut[j];
+        // Edges are found by the variable of the faster wall.
+        const double faster = std::abs(cut.rate) * other.length - std::abs(other.rate) * cut.length;
+        if (faster > 0 || (faster == 0 && j < i))
+          if (const auto line = meeting(of, cut, other)) add_edge(of, i, j, *line);
+      }
     }
   }
 
@@ -186,20 +199,21 @@ class WallChanges {
     for (int j = 0; j < found.count; ++j) result_.add(of.t(found.t[j]));
   }
   /// Where an edge of two walls meets a circle, or a third wall.
-  void add_edge(int i, int j, const Line& edge) {
+  void add_edge(const Scaled& of, int i, int j, const Line& edge) {
     const Quadratic size = dot(edge, edge);
     for (const int k : {0, 1}) {
-      const Quadratic to_centre = dot(edge, centre_[k]);
+      const Quadratic to_centre = dot(edge, of.centre[k]);
       Quadratic on;
-      for (size_t m = 0; m < on.size(); ++m) on[m] = size[m] - 2 * to_centre[m] - (*slack_[k])[m];
-      const Roots found = roots<2>(on, low_, high_);
-      for (int m = 0; m < found.count; ++m) add(found.t[m], edge.at(found.t[m]), i, j);
+      for (size_t m = 0; m < on.size(); ++m) on[m] = size[m] - 2 * to_centre[m] - of.slack[k][m];
+      const Roots found = roots<2>(on, of.low, of.high);
+      for (int m = 0; m < found.count; ++m) add(of.t(found.t[m]), edge.at(found.t[m]), i, j);
     }
-    for (int k = 0; k < j; ++k) {
+    for (int k = 0; k < discs_.cuts; ++k) {
+      if (k == i || k == j) continue;
       const Cut& third = discs_.cut[k];
-      const auto height = along(third.normal, edge);
-      const double t = (third.offset - height[0]) / (height[1] + third.rate);
-      if (t > low_ && t < high_) add(t, edge.at(t), i, j);
+      const auto height = along((1 / third.length) * third.normal, edge), side = side_by(of, third);
+      const double u = (side[0] - height[0]) / (height[1] - side[1]);
+      if (u > of.low && u < of.high) add(of.t(u), edge.at(u), i, j);
     }
   }
   void add(double t, Flat point, int i, int j) {

@@ -41,7 +41,7 @@ Integral integrate(const Integrand& integrand, double low, double high, double w
   }
   value *= half, gauss *= half;
   const double apart = std::abs(value - gauss);
-  if (apart <= Stretch::kApart * value || apart <= DBL_EPSILON * whole || halvings == kMostHalvings)
+  if (!(apart > Stretch::kApart * value && apart > DBL_EPSILON * whole) || halvings == kMostHalvings)
     return {value, apart};
   const double all = std::max(whole, value);
   const Integral below = integrate(integrand, low, middle, all, halvings + 1),
@@ -72,9 +72,11 @@ double Stretch::arc(Vec3 level, Vec3 across, Vec3 along, double half_angle) cons
 }
 
 Stretch::Cap Stretch::cap(Vec3 normal, double height) const {
+  // By rounding, a plane that touches the ball may cut off less than nothing, or leave less than nothing.
+  if (!(height > 0)) return {0, 0};
   const Vec3 across = any_orthogonal(normal), along = cross(normal, across);
   const auto circle = [&](double h) {
-    const double radius = std::sqrt(h * (2 - h));
+    const double radius = std::sqrt(std::max(0.0, h * (2 - h)));
     return arc((1 - h) * normal, radius * across, radius * along, std::numbers::pi);
   };
   const Integral area = integrate(circle, 0, height, 0);
