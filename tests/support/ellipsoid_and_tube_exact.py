@@ -1,8 +1,8 @@
 """The volume that an ellipsoid shares with a capsule or a cylinder, to some twenty digits, by code of its own.
 
 Slices are orthogonal to the axis of the capsule or the cylinder, which is a disc there. The ellipsoid is an ellipse.
-The crossings of both are roots of a quartic. Areas of slices follow from Green's theorem, in 400 bits. Where the number of
-crossings changes, halving finds the height. Between such heights, Gauss-Legendre rules of two sizes have to agree.
+The crossings of both are roots of a quartic. Areas of slices follow from Green's theorem, in 400 bits. Where the number
+of crossings changes, halving finds the height. Between such heights, Gauss-Legendre rules of two sizes have to agree.
 Intervals are halved where they do not.
 """
 
