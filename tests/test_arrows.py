@@ -29,6 +29,7 @@ APART = ["methods/clipping", "methods/tracing", "methods/dual"]
 # The folders of the ways for round pairs, each with those that its files may include.
 ROUND = {
     "closed_forms": ["closed_forms", "quadric"],
+    "lenses": ["lenses", "pieces", "slicing", "quadric"],
     "pieces": ["pieces", "slicing", "quadric"],
     "slicing": ["slicing", "quadric"],
     "quadric": ["quadric"],

@@ -13,7 +13,7 @@ def test_classes_and_margins_are_measured_and_their_page_is_drawn(monkeypatch, t
     figures = round_page.read(tmp_path / "round.csv")[1]
     assert set(figures["class"]) == {"box, box", "box, ball", "capsule, ellipsoid", "capsule, rounded hull"}
     assert all(0 < each["median"] <= each["99 %"] for each in figures["class"].values())
-    assert figures["class"]["capsule, ellipsoid"]["dual hull"] == 100
+    assert figures["class"]["capsule, ellipsoid"]["slicing"] == 100
     page = (tmp_path / "round.md").read_text(encoding="utf-8")
     assert "| capsule, rounded hull |" in page and "| meshes of 8 corners |" in page and "$" not in page
     assert (tmp_path / "round.png").stat().st_size > 10_000

@@ -138,5 +138,5 @@ def test_a_killed_command_leaves_whole_files_and_runs_again(command, tmp_path):
     # The rows that a killed run had finished are kept. Nothing else is left.
     for name in files_of(folder) - known:
         assert ".unfinished" in name, name
-        if command in ("run", "watch") and not name.endswith(("-wal", "-shm")) and begun(folder / name):
+        if command in ("run", "watch") and not name.endswith(("-journal", "-wal", "-shm")) and begun(folder / name):
             assert isinstance(read_table(folder / name), list)

@@ -70,7 +70,7 @@ inline constexpr std::array<RoundChoice, 13> kRoundChoices{{
     {"an ellipsoid, and a capsule, a cylinder or a rounded hull",
      [](const RoundTraits& t) { return t.stretched == 1 && t.capsules + t.cylinders + t.rounded_hulls == 1; },
      {},
-     pieces::measure_stretched_in_parts},
+     lenses::measure_in_parts},
     {"a rounded hull, and no ellipsoid",
      [](const RoundTraits& t) { return t.rounded_hulls > 0 && t.stretched == 0; },
      {},

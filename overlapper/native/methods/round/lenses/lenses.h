@@ -18,6 +18,10 @@ namespace overlapper::lenses {
 /// the volume.
 std::optional<pieces::RoundMeasures> measure_lenses(const pieces::SlicedPair& pair);
 
+/// An ellipsoid and a capsule, a cylinder or a rounded hull. Each part of the other body is a part of a ball or of a
+/// cylinder inside planes, or a polytope.
+std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& pair);
+
 /// The rounding of all terms of a slack, and of all sums of slices, in units of the last bit.
 inline constexpr double kRoundings = 16;
 

@@ -63,8 +63,4 @@ std::optional<RoundMeasures> measure_culled_pieces(const SlicedPair& pair);
 /// An ellipsoid and a box, a hull or a half-space: measures the ball that a stretch maps to the ellipsoid.
 std::optional<RoundMeasures> measure_stretched(const SlicedPair& pair);
 
-/// An ellipsoid and a capsule, a cylinder or a rounded hull. Each part of the other body is a part of a ball or of a
-/// cylinder inside planes, or a polytope.
-std::optional<RoundMeasures> measure_stretched_in_parts(const SlicedPair& pair);
-
 }  // namespace overlapper::pieces

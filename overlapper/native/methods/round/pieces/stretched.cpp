@@ -1,16 +1,12 @@
+#include "methods/round/pieces/stretched.h"
+
 #include <limits>
 
 #include "geometry/scratch.h"
-#include "methods/round/lenses/lenses.h"
-#include "methods/round/pieces/measure.h"
 #include "methods/round/pieces/piece.h"
-#include "methods/round/pieces/pieces.h"
 
 namespace overlapper::pieces {
-namespace {
 
-/// Maps an ellipsoid to a ball of radius 1, and maps the pieces with it. The axes are those of the ellipsoid. Radii and
-/// axes of rounds stay as long as they are in the world.
 void into_ball(const Placed& ellipsoid, Vec3 h, Pieces& pieces) {
   const WideMatrix rotation = wide_rotation(ellipsoid.orientation);
   for (Round& r : pieces.rounds) {
@@ -26,7 +22,6 @@ void into_ball(const Placed& ellipsoid, Vec3 h, Pieces& pieces) {
   }
 }
 
-/// The same view for a ball that is turned and stretched to the ellipsoid. Coordinates of the ball are about `origin`.
 PatchView stretched_view(const PatchView& view, const Mat3& turn, const quadric::Stretch& stretch, Vec3 origin) {
   PatchView result;
   result.owner = view.owner;
@@ -37,9 +32,7 @@ PatchView stretched_view(const PatchView& view, const Mat3& turn, const quadric:
   return result;
 }
 
-struct StretchedPieces {
-  Pieces of_flat, of_ellipsoid;
-};
+namespace {
 
 /// The best sums of a ball and planes.
 struct BallSums {
@@ -91,16 +84,8 @@ double inertia_error(const Totals& totals, const quadric::Stretch& stretch) {
          (dot(scaled(h, h), squares) + dot(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, products));
 }
 
-/// The sums of the ball, and their errors.
-struct OfBall {
-  const Totals& totals;
-  double error;                 ///< of the volume, in units of the ball's
-  double misplaced;             ///< m: error of surfaces
-  std::optional<double> moved;  ///< m: bound of the movement of surfaces by rounding, if known
-  Vec3 origin;                  ///< the point that the sums are about, relative to the inner point
-};
+}  // namespace
 
-/// Volumes are multiplied by the determinant. The matrix of cofactors maps area vectors.
 RoundMeasures in_world(const OfBall& of, const SlicedPair& pair, const Placed& ellipsoid,
                        const quadric::Stretch& stretch, bool swapped) {
   const Totals& totals = of.totals;
@@ -126,8 +111,6 @@ RoundMeasures in_world(const OfBall& of, const SlicedPair& pair, const Placed& e
   return result;
 }
 
-}  // namespace
-
 std::optional<RoundMeasures> measure_stretched(const SlicedPair& pair) {
   const bool swapped = stretched(pair.b.shape) == nullptr;
   const Placed &flat = swapped ? pair.b : pair.a, &ellipsoid = swapped ? pair.a : pair.b;
@@ -150,58 +133,6 @@ std::optional<RoundMeasures> measure_stretched(const SlicedPair& pair) {
       in_world({best.sums.totals, best.error, of_flat.misplaced() + of_ellipsoid.rounding, {}, best.moved}, pair,
                ellipsoid, stretch, swapped);
   result.facets_touched = static_cast<int>(of_flat.walls.size());
-  return result;
-}
-
-std::optional<RoundMeasures> measure_stretched_in_parts(const SlicedPair& pair) {
-  const bool swapped = stretched(pair.b.shape) != nullptr;
-  const Placed &other = swapped ? pair.a : pair.b, &ellipsoid = swapped ? pair.b : pair.a;
-  const Scratch<StretchedPieces> scratch;
-  auto& [of_other, of_ellipsoid] = *scratch;
-  of_other.clear(), of_ellipsoid.clear();
-  EnclosingPolytope common;
-  const bool many = facets(other.shape) > 0;
-  if (many) enclose(other, ellipsoid, rounded(pair.inside), common);
-  cut(other, ellipsoid, many ? &common : nullptr, 1, pair.reference, pair.inside, of_other);
-  cut(ellipsoid, other, nullptr, 0, pair.reference, pair.inside, of_ellipsoid);
-  if (pair.outwards != 0 && !grow(of_other, pair.outwards)) return std::nullopt;
-  const Vec3 h = stretched(ellipsoid.shape)->half_axes;
-  into_ball(ellipsoid, h, of_other);
-  into_ball(ellipsoid, h, of_ellipsoid);
-  const Mat3& turn = ellipsoid.pose.rotation;
-  const quadric::Stretch stretch(h);
-  const double misplaced = of_other.misplaced() + of_ellipsoid.rounding;
-
-  PieceSetting setting;
-  setting.stretch = &stretch;
-  setting.extent = norm(rounded(of_ellipsoid.rounds[0].centre)) + 1;
-  Sums sums;
-  sums.patch = pair.patch ? std::optional(*pair.patch) : std::nullopt;
-  lenses::InEllipsoid in{stretch, of_ellipsoid.rounds[0].centre, misplaced / std::min({h.x, h.y, h.z})};
-  in.with_area = pair.with_area;
-  if (pair.patch) {
-    setting.view = stretched_view(PatchView(*pair.patch, 0), turn, stretch, {});
-    in.view = lenses::View{setting.view.u0, setting.view.v0, setting.view.u, setting.view.v, setting.view.normal};
-  }
-  for (size_t i = 0; i < of_other.pieces.size(); ++i) {
-    const int round = of_other.pieces[i].round;
-    const std::span<const Wall> walls = of_other.of(static_cast<int>(i));
-    if (round < 0 ? !add_piece(of_ellipsoid.rounds, walls, nullptr, setting, sums)
-                  : !lenses::add_part(in, of_other.rounds[round], walls, sums))
-      return std::nullopt;
-  }
-  const Totals& totals = sums.totals;
-  const double volume = totals.volume, error = totals.error + open_volume(totals) + of_other.gaps / stretch.volume;
-  if (!(volume > 0 && error <= kMostError * volume)) return std::nullopt;
-  if (pair.patch) {
-    // The patch is that of the ellipsoid's surface. Seen from the other body, it has the opposite sign.
-    const PatchSums none = *pair.patch;
-    const bool same = (pair.owner == 0) != swapped;
-    pair.patch->add_difference(same ? *sums.patch : none, same ? none : *sums.patch);
-  }
-  RoundMeasures result = in_world({totals, error, misplaced, in.moved, {}}, pair, ellipsoid, stretch, swapped);
-  result.area_error += of_other.gap_area;
-  result.area_known = pair.with_area;
   return result;
 }
 
