@@ -3,7 +3,7 @@
     python benchmarks firsttry          all scenes, some minutes
     python benchmarks firsttry --page   only the page, from the results there are
 
-A scene ends as Bullet's does if all of these hold. The numbers were chosen before any result was seen.
+A scene ends as Bullet's does if all of these hold. The numbers were chosen before the whole list was run.
 
 - Poses and velocities are finite, and no exception is raised.
 - At least as many bodies rest as with Bullet. A body rests if its base moves by less than 5 mm in the last half second.
