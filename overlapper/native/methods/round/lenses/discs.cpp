@@ -131,12 +131,12 @@ std::array<double, 2> ends_of(const Quadratic& square) {
 /// Up to this sine of the angle between a wall and the slices, the wall ends them.
 constexpr double kParallel = 0x1p-46;
 
-void add_wall(const Wall& wall, const Axes& axes, Flat lean, Discs& result) {
+void add_wall(const slicing::Wall& wall, const Axes& axes, Flat lean, Discs& result) {
   const DoubleDouble x = overlapper::dot(wall.normal, wide(axes.x)), y = overlapper::dot(wall.normal, wide(axes.y)),
                      n = overlapper::dot(wall.normal, wide(axes.n));
   const DoubleDouble rate = n + (DoubleDouble{lean.x} * x + DoubleDouble{lean.y} * y);
-  Cut cut{{x.head, y.head}, std::hypot(x.head, y.head), wall.slack.head, rate.head, n.head, wall.face, wall.slack.tail,
-          rate.tail};
+  Cut cut{{x.head, y.head}, std::hypot(x.head, y.head),  wall.slack.head, rate.head,
+          n.head,           wall.owner != slicing::kCut, wall.slack.tail, rate.tail};
   if (cut.length > kParallel) {
     result.cut[result.cuts++] = cut;
     return;
@@ -208,7 +208,7 @@ std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& seco
   return result;
 }
 
-std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::span<const Wall> walls) {
+std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::span<const slicing::Wall> walls) {
   const WideMatrix& k = second.k;
   const WideVector& k_centre = second.middle;
   const DoubleDouble one{1}, slack_first = one - overlapper::dot(c, c),
@@ -270,7 +270,7 @@ std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::s
   result.second_rise = std::sqrt(-result.second_square[2] * value.head);
   result.cylinder = second.cylinder;
   if (second.cylinder) result.second_square = {round.head, 0, 0}, result.second_rise = 0;
-  for (const Wall& wall : walls) add_wall(wall, axes, lean, result);
+  for (const slicing::Wall& wall : walls) add_wall(wall, axes, lean, result);
   return result;
 }
 

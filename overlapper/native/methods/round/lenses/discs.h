@@ -7,6 +7,7 @@
 
 #include "geometry/wide_pose.h"
 #include "methods/round/quadric/stretch.h"
+#include "methods/round/slicing/wall.h"
 #include "shapes/shape.h"
 
 namespace overlapper::lenses {
@@ -61,19 +62,12 @@ struct SecondBall {
   bool cylinder = false;
 };
 
-/// A plane that cuts the second body: { y : normal · y <= slack } about the inner point.
-struct Wall {
-  WideVector normal;  ///< unit
-  DoubleDouble slack;
-  bool face;  ///< a face of the second body, not a cut between two parts of it
-};
-
 /// A wall in the slices: normal · p <= offset − rate t, with p about the foot. A wall parallel to the slices ends them.
 struct Cut {
   Flat normal;
   double length, offset, rate;
-  double across;  ///< the component of the unit normal across the slices
-  bool face;
+  double across;                          ///< the component of the unit normal across the slices
+  bool face;                              ///< a face of the second body, not a cut between two parts of it
   double offset_tail = 0, rate_tail = 0;  ///< what doubles cannot hold
   /// A wall nearly parallel to the slices crosses them within a short interval. There, the tail of t counts.
   double side(double t, double tail = 0) const {
@@ -135,8 +129,9 @@ struct Discs {
 std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& second);
 
 /// The same for a first body that is the unit ball about `centre`. No value if the inner point is not inside it, or if
-/// there are too many walls. The point may be outside the second body.
-std::optional<Discs> discs(const WideVector& centre, const SecondBall& second, std::span<const Wall> walls);
+/// there are too many walls. Walls are planes in the same coordinates that cut the second body. The point may be
+/// outside the second body.
+std::optional<Discs> discs(const WideVector& centre, const SecondBall& second, std::span<const slicing::Wall> walls);
 
 /// Whether sections are closer to discs, relative to rounding, if `first` becomes the ball.
 bool better_first(const StretchedBall& first, const StretchedBall& second);

@@ -25,8 +25,8 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
 /// The rounding of all terms of a slack, and of all sums of slices, in units of the last bit.
 inline constexpr double kRoundings = 16;
 
-/// What an ellipsoid shares with all parts of another body. Coordinates are along the ellipsoid's axes, in units of its
-/// half axes, about the inner point.
+/// An ellipsoid that the parts of another body are cut with. Coordinates are along the ellipsoid's axes, in units of
+/// its half axes, about the inner point.
 struct InEllipsoid {
   quadric::Stretch stretch;
   WideVector centre;     ///< of the ellipsoid

@@ -37,9 +37,7 @@ double area_rate(const slicing::Round& round, Vec3 across, Vec3 half_axes) {
 }  // namespace
 
 bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slicing::Wall> walls, pieces::Sums& sums) {
-  std::vector<Wall> own;
-  for (const slicing::Wall& wall : walls) own.push_back({wall.normal, wall.slack, wall.owner != slicing::kCut});
-  std::optional<Discs> found = discs(of.centre, second_ball(round, of.stretch.half_axes), own);
+  std::optional<Discs> found = discs(of.centre, second_ball(round, of.stretch.half_axes), walls);
   if (!found) return false;
   found->misplaced = of.misplaced / (kRoundings * DBL_EPSILON);
   found->second_area = area_rate(round, found->normal, of.stretch.half_axes);

@@ -33,7 +33,7 @@ struct Crossings {
 bool on_arc(Flat from, Flat to, Flat point) { return cross(to - from, point - from) <= 0; }
 
 void add(Region& region, Flat at, int curve) {
-  if (region.corners < Region::kMostCorners) region.corner[region.corners++] = {at, curve};
+  if (region.corners < Region::kMostCorners) region.corner[region.corners++] = {at.x, at.y, curve};
 }
 
 /// Cuts off what is beyond a wall.
@@ -61,8 +61,8 @@ void clip(Region& region, int wall, Flat normal, double side) {
   std::copy_n(region.corner.begin(), corners, before.begin());
   region.corners = 0;
   for (int i = 0; i < corners; ++i) {
-    const auto [from, curve] = before[i];
-    const Flat to = before[i + 1 < corners ? i + 1 : 0].at;
+    const Flat from = before[i].at(), to = before[i + 1 < corners ? i + 1 : 0].at();
+    const int curve = before[i].curve;
     const double of_from = side - dot(normal, from), of_to = side - dot(normal, to);
     const bool stays = of_from >= 0, ends = of_to >= 0;
     if (stays) add(region, from, curve);
@@ -123,9 +123,9 @@ struct Scaled {
   double t(double u) const { return start + step * u; }
 };
 
-/// The values of u with 4 G² = B² C, where the line of a wall goes through a crossing of both circles. With A from the
-/// first centre to the second, D the difference of the slacks, X = A × the first centre, and w the wall's side about
-/// the foot: G = w A·A − D/2 n·A − X n·A⊥, B = n·A⊥, and C as in chord().
+/// The values of u where the line of a wall goes through a crossing of both circles: 4 G² = B² C, with C as in chord().
+/// G = w A·A − D/2 n·A − X n·A⊥, and B = n·A⊥. A leads from the first centre to the second. D is the difference of the
+/// slacks, X is A × the first centre, and w is the wall's side about the foot.
 std::array<double, 7> through_crossing(const Scaled& of) {
   const Line& a = of.apart;
   const Line turned{{-a.start.y, a.start.x}, {-a.slope.y, a.slope.x}};

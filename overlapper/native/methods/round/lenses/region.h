@@ -31,10 +31,12 @@ struct Region {
   static constexpr int kMostCorners = 2 * kMostCuts + 2;
   /// The curve from this corner to the next one: the first or the second circle, or 2 and the number of the wall.
   struct Corner {
-    Flat at;
+    double x, y;
     int curve;
+
+    Flat at() const { return {x, y}; }
   };
-  std::array<Corner, kMostCorners> corner;
+  std::array<Corner, kMostCorners> corner;  ///< entries beyond `corners` are not set
   int corners = 0;
   std::optional<int> whole;  ///< the circle, if the region is its whole disc
   std::array<Circle, 2> circle;
@@ -44,12 +46,12 @@ struct Region {
 
   bool empty() const { return corners == 0 && !whole; }
   Flat aside() const { return {-ahead.y, ahead.x}; }
-  Flat next(int i) const { return corner[i + 1 < corners ? i + 1 : 0].at; }
+  Flat next(int i) const { return corner[i + 1 < corners ? i + 1 : 0].at(); }
 };
 Region region(const Discs& discs, const Section& section, double t, double tail = 0);
 
-/// The values of t where a wall touches a circle or meets a crossing of both circles, and where an edge of two walls
-/// meets a circle or a third wall.
+/// Adds the values of t where a wall touches a circle or meets a crossing of both circles. Also adds those where an
+/// edge of two walls meets a circle or a third wall.
 void add_changes_by_walls(const Discs& discs, double low, double high, Changes& result);
 
 }  // namespace overlapper::lenses

@@ -270,8 +270,7 @@ void add_blur_of_region(const Place& place, const Region& of, const std::array<d
   const Discs& d = place.discs;
   const Section& s = place.section;
   double reach = 0;
-  for (int i = 0; i < of.corners; ++i)
-    reach = std::max({reach, std::abs(of.corner[i].at.x), std::abs(of.corner[i].at.y)});
+  for (int i = 0; i < of.corners; ++i) reach = std::max({reach, std::abs(of.corner[i].x), std::abs(of.corner[i].y)});
   if (of.about_foot) {
     const std::array<const Quadratic*, 2> slack{&d.first_slack, &d.second_slack};
     const std::array<Line, 2> centre{d.first_centre(), d.second_centre()};
@@ -306,8 +305,7 @@ void add_wall(const Place& place, const Cut& cut, double length, const Wanted& w
   const Vec3 normal{cut.across, cut.normal.x, cut.normal.y};
   (cut.face ? sums.second_force : sums.cut_force) += part * normal, sums.border += part;
   if (!wanted.first || !cut.face) return;
-  const double area = part * wanted.first->area(place.world(normal));
-  sums.second_area += area, sums.face_area += area;
+  sums.second_area += part * wanted.first->area(place.world(normal));
 }
 
 Sums cut_slice(const Place& place, const Wanted& wanted) {
@@ -322,9 +320,9 @@ Sums cut_slice(const Place& place, const Wanted& wanted) {
   std::array<double, 2> half_angle{};
   std::array<double, kMostCuts> length{};
   for (int i = 0; i < of.corners; ++i) {
-    const auto [from, curve] = of.corner[i];
-    const Flat to = of.next(i), way = to - from;
-    if (i > 0 && i + 1 < of.corners) flat.add(of.corner[0].at, from, to);
+    const int curve = of.corner[i].curve;
+    const Flat from = of.corner[i].at(), to = of.next(i), way = to - from;
+    if (i > 0 && i + 1 < of.corners) flat.add(of.corner[0].at(), from, to);
     const double whole = std::sqrt(dot(way, way));
     if (!(whole > 0)) continue;
     if (curve >= 2) {
@@ -357,7 +355,7 @@ void Sums::add(double weight, const Sums& other) {
       moved.row2 += weight * other.moved.row2;
   blur += weight * other.blur, oval += weight * other.oval, terms = std::max(terms, other.terms);
   first_area += weight * other.first_area, second_area += weight * other.second_area;
-  face_area += weight * other.face_area, border += weight * other.border;
+  border += weight * other.border;
   second_force += weight * other.second_force, cut_force += weight * other.cut_force;
   for (size_t i = 0; i < patch.size(); ++i) patch[i] += weight * other.patch[i];
 }
@@ -372,8 +370,7 @@ void add_end(const Discs& discs, const Cut& end, double area, const Wanted& want
   const double side = end.across > 0 ? 1 : -1;
   (end.face ? sums.second_force : sums.cut_force) += Vec3{side * area, 0, 0}, sums.border += area;
   if (!wanted.first || !end.face) return;
-  const double stretched = area * wanted.first->area(discs.normal);
-  sums.second_area += stretched, sums.face_area += stretched;
+  sums.second_area += area * wanted.first->area(discs.normal);
 }
 
 }  // namespace overlapper::lenses

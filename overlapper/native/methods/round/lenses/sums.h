@@ -33,7 +33,6 @@ struct Sums {
   double terms = 0;        ///< the largest of those terms
   double first_area = 0, second_area = 0;  ///< m²
   std::array<double, 6> patch{};           ///< ∫ 1, u, v, u², uv, v² of the weight
-  double face_area = 0;                    ///< m²: of walls that are faces; included in the second area
   Vec3 second_force;                       ///< ∫ N dA over the second surface and its faces, with `closing`
   Vec3 cut_force;                          ///< the same over walls that are no faces; with all other surface it closes
 
