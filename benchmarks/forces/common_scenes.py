@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -120,29 +121,14 @@ def panda_grasp(world: BulletClient, model: str, height: float, grip: float = 0.
     return Script(command, lifted=thing)
 
 
-@lasting(7.6)
-def panda_cube(world: BulletClient) -> Script:
-    return panda_grasp(world, "cube_small.urdf", 0.026)
-
-
-@lasting(7.6)
-def panda_sphere(world: BulletClient) -> Script:
-    return panda_grasp(world, "sphere_small.urdf", 0.03, grip=0.03)
-
-
-@lasting(7.6)
-def panda_lego(world: BulletClient) -> Script:
-    return panda_grasp(world, "lego/lego.urdf", 0.03)
-
-
-@lasting(7.6)
-def panda_random5(world: BulletClient) -> Script:
-    return panda_grasp(world, "random_urdfs/005/005.urdf", 0.03, grip=0.03)
-
-
-@lasting(7.6)
-def panda_random20(world: BulletClient) -> Script:
-    return panda_grasp(world, "random_urdfs/020/020.urdf", 0.03, grip=0.03)
+GRASPED: dict[str, dict[str, Any]] = {
+    "panda_cube": {"model": "cube_small.urdf", "height": 0.026},
+    "panda_sphere": {"model": "sphere_small.urdf", "height": 0.03, "grip": 0.03},
+    "panda_lego": {"model": "lego/lego.urdf", "height": 0.03},
+    "panda_random5": {"model": "random_urdfs/005/005.urdf", "height": 0.03, "grip": 0.03},
+    "panda_random20": {"model": "random_urdfs/020/020.urdf", "height": 0.03, "grip": 0.03},
+}
+SCENES |= {name: Scene(partial(panda_grasp, **thing), 7.6) for name, thing in GRASPED.items()}
 
 
 def standing(world: BulletClient, robot: int, angles: Sequence[float], force: float) -> Script:

@@ -16,8 +16,8 @@ from overlapper.tables.table_file import TABLES, origin
 # Every column, in order, with its type; the unit is in the name. `adjacent` is 1 or 0, and so is `at_rest`:
 # whether the pair overlaps in configuration 0. Joints are JSON, by name, in rad and m. `page` links to the pose of the
 # largest volume. `not_modelled` says which shapes of the links are left out. `proof` is the verdict of --prove. The
-# next columns are the share of the joint positions that is open, the least distance seen, its joints, the number of
-# boxes, and why a pair is open without having been searched.
+# next columns are the share of the joint positions that is open, the least distance seen, and its joints. Then follow
+# the number of boxes, and why a pair was not searched.
 COLUMNS: dict[str, type] = {
     "nameA": str,
     "nameB": str,

@@ -222,15 +222,20 @@ def test_unmoved_joints_and_unmodelled_shapes_are_reported(tmp_path):
     ]
 
 
-def test_proofs_are_shown_written_and_verified(tmp_path):
-    arm = urdf(
-        tmp_path / "arm.urdf",
-        link("base", ("0.2 0.2 0.2", "0 0 0")),
+def planar_arm(path, size, shoulder, elbow):
+    """An arm of two links of 1 m in a plane. The base and the end have boxes of this size."""
+    return urdf(
+        path / "arm.urdf",
+        link("base", (size, "0 0 0")),
         link("upper", ("0.2 0.2 0.2", "0.5 0 0")),
-        link("lower", ("0.2 0.2 0.2", "1 0 0")),
-        joint("shoulder", "revolute", "base", "upper", limit(-1, 1)),
-        joint("elbow", "revolute", "upper", "lower", limit(-2, 2), xyz="1 0 0"),
+        link("lower", (size, "1 0 0")),
+        joint("shoulder", "revolute", "base", "upper", limit(-shoulder, shoulder)),
+        joint("elbow", "revolute", "upper", "lower", limit(-elbow, elbow), xyz="1 0 0"),
     )
+
+
+def test_proofs_are_shown_written_and_verified(tmp_path):
+    arm = planar_arm(tmp_path, "0.2 0.2 0.2", shoulder=1, elbow=2)
     code, said, complaints = run(arm, "--prove", "--cover", "proofs.npz", "--srdf", "arm.srdf")
     assert (code, complaints) == (0, "")
     assert "For all joint positions: 1 of 1 pairs that are not adjacent never overlap (proved), 0 overlap" in said
@@ -259,14 +264,7 @@ def test_a_refused_proof_is_an_exit_code(robot, tmp_path):
 
 
 def test_an_overlap_that_only_the_proof_found_is_said(tmp_path):
-    arm = urdf(
-        tmp_path / "arm.urdf",
-        link("base", ("0.001 0.001 0.001", "0 0 0")),
-        link("upper", ("0.2 0.2 0.2", "0.5 0 0")),
-        link("lower", ("0.001 0.001 0.001", "1 0 0")),
-        joint("shoulder", "revolute", "base", "upper", limit(-0.1, 0.1)),
-        joint("elbow", "revolute", "upper", "lower", limit(-4, 4), xyz="1 0 0"),
-    )
+    arm = planar_arm(tmp_path, "0.001 0.001 0.001", shoulder=0.1, elbow=4)
     code, said, _ = run(arm, "--prove", "--configurations", 1)
     assert code == 0 and "Overlap that no sample had: base and lower at shoulder " in said
 

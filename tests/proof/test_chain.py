@@ -151,7 +151,7 @@ def test_no_configuration_of_a_box_is_nearer_than_the_bound(seed):
 
 
 def test_the_bound_is_tight_where_one_joint_swings_a_point():
-    # A ball on an arm of 1 m turns towards a ball: the gap is 2 - cos q - 0.2 along x, first 0.8, and 0.8 at q = 0.
+    # A ball on an arm of 1 m turns towards a ball. The gap along x is 2 - cos q - 0.2. It is 0.8 at q = 0.
     arm = ChainJoint("revolute", np.zeros(3), np.array([0, 0, 0, 1.0]), np.array([0, 0, 1.0]), np.zeros(3), 0, 1.0, 0.0)
     still, at_1 = np.array([0, 0, 0, 1.0]), np.array([1.0, 0, 0])
     a = Body(np.zeros((1, 3)), 0.1, np.array([2.0, 0, 0]), still, ())

@@ -39,7 +39,7 @@ Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const Three
   const ThreeByThree foundation = area.foundation(patch.stiffness);
   const double lead = ahead(rule) * duration;
   response_ = (lead + patch.dissipation) * foundation;
-  // The bodies' mass along the normal is the inverse of their mobility. What tips or rolls is not damped.
+  // The bodies' mass along the normal is the inverse of their mobility. Tipping and rolling are not damped.
   if (mobility[0][0] > 0) response_[0][0] += 2 * patch.damping * std::sqrt(foundation[0][0] / mobility[0][0]);
   // Backward Euler depends on the velocity at the end only. The other rule depends on the change of the velocity.
   const Three known = (rule == Rule::kKeeping ? lead : 0) * (foundation * before);

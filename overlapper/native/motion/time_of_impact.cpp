@@ -366,9 +366,9 @@ class Motion {
     return open;
   }
 
-  /// The gap along the normal of the nearest points. Where this normal is not accurate, two edges or three corners of a
-  /// facet give a better one: the nearest points may be very close to each other, or the search may have ended before
-  /// the last corner, which is farther along the normal.
+  /// The gap along the normal of the nearest points. The nearest points may be very close to each other. The search may
+  /// also have ended before the last corner, which is farther along the normal. Then this normal is not accurate, and
+  /// two edges or three corners of a facet give a better one.
   Gap gap_of(const Distance& d, double t, double earlier = 0) {
     const Gap gap = gap_along(d.normal, last_, d, t, earlier);
     const double now = gap.value_here(0);

@@ -30,8 +30,8 @@ struct Impact {
 };
 
 /// The first common point of two moving bodies within `duration`. `width`, in s, is the wanted width of the interval.
-/// This is conservative advancement along directions that turn with the bodies: the nearest points give a direction,
-/// and the bodies are separated until the gap along this direction may be closed. Throws std::invalid_argument if both
+/// This is conservative advancement along directions that turn with the bodies. The nearest points give a direction.
+/// The bodies are separated until the gap along this direction may be closed. Throws std::invalid_argument if both
 /// bodies are half-spaces.
 Impact time_of_impact(const Placed& a, const Placed& b, const Velocity& of_a, const Velocity& of_b, double duration,
                       double width);
