@@ -73,7 +73,10 @@ def audit(
     prove: Annotated[
         bool, typer.Option("--prove", help="Prove which pairs never overlap, for all joint positions.")
     ] = False,
-    limit: Annotated[int, typer.Option(min=1, help="Boxes of joint positions that --prove takes for a pair.")] = LIMIT,
+    limit: Annotated[
+        int | None,
+        typer.Option(min=1, help=f"Boxes of joint positions that --prove takes for a pair: {LIMIT:,} if not given."),
+    ] = None,
     cover: Annotated[
         Path | None, typer.Option(help="Write the proofs of --prove to a file that --verify checks: .npz.")
     ] = None,
@@ -119,7 +122,8 @@ def audit(
     """
     refuse_tolerance(tolerance)
     refuse_table(out)
-    _refuse_cover(cover, prove)
+    _refuse_without_proofs(prove, limit, cover)
+    boxes = limit or LIMIT
     pairs = expected_pairs(expect)
     settings: dict[str, Any] = {
         "configurations": configurations,
@@ -130,7 +134,7 @@ def audit(
         "tolerance": tolerance,
         **settings_of(modelled),
     }
-    settings |= {"limit": limit} if prove else {}
+    settings |= {"limit": boxes} if prove else {}
     if robot.is_dir():
         asked: dict[str, Any] = {
             "--expect": expect,
@@ -178,7 +182,7 @@ def audit(
                 lambda blocks, count: with_progress(blocks, robot.name, count),
             )
             if prove:
-                found = _proved(found, limit, least_depth, working)
+                found = _proved(found, boxes, least_depth, working)
         if not found.pairs:
             left_out = "".join(f"; {name} is not modelled, because {why}" for name, why in not_modelled(read).items())
             raise Refused(f"{robot} has no two links with shapes that could overlap{left_out}")
@@ -209,9 +213,11 @@ def audit(
     raise typer.Exit(1 if wrong else 0)
 
 
-def _refuse_cover(cover: Path | None, prove: bool) -> None:
-    if cover and not prove:
-        raise Refused("--cover needs --prove")
+def _refuse_without_proofs(prove: bool, limit: int | None, cover: Path | None) -> None:
+    """Refuse options of proofs that would have no effect, and a file of proofs with another ending."""
+    for name, given in {"--limit": limit, "--cover": cover}.items():
+        if given and not prove:
+            raise Refused(f"{name} needs --prove")
     if cover and cover.suffix != ".npz":
         raise Refused(f"--cover must end in .npz, not {cover.name!r}")
 

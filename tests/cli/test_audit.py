@@ -273,6 +273,7 @@ def test_an_overlap_that_only_the_proof_found_is_said(tmp_path):
     ("arguments", "sentence"),
     [
         (["table.urdf", "--cover", "proofs.npz"], "--cover needs --prove"),
+        (["table.urdf", "--limit", "5"], "--limit needs --prove"),
         (["table.urdf", "--prove", "--cover", "proofs.json"], "--cover must end in .npz, not 'proofs.json'"),
         ([".", "--prove"], "--prove needs a robot, but . is a folder"),
         (["table.urdf", "--verify", "table.urdf"], "table.urdf is not a file of covers"),
