@@ -10,7 +10,7 @@ import pybullet as p
 import pybullet_data
 
 STEPS = 300
-CONTACT = "volumetric"
+CONTACT = {"dissipation": 1e-3}  # s: the expected states are those of this damping
 DOWN = p.getQuaternionFromEuler([math.pi, 0, 0])
 FINGERS, GRASP_POINT = (9, 10), 11
 READY = [0.0, 0.35, 0.0, -2.2, 0.0, 2.55, math.pi / 4]

@@ -379,12 +379,23 @@ def test_rows_before_a_failure_are_on_disk(tmp_path, ending):
     assert not (tmp_path / f"fails.{ending}").exists() and not (tmp_path / "fails.html").exists()
 
 
-def interrupted(*args, said, after):
-    """Its output and its complaints, if Ctrl-C comes so many seconds after the scene has said that."""
+def size_of(pattern):
+    return sum(path.stat().st_size for path in Path().glob(pattern))
+
+
+def interrupted(*args, said, after, grown=None):
+    """Its output and its complaints, if Ctrl-C comes so many seconds after the scene has said that.
+
+    With `grown`, the seconds begin when the files of this pattern have grown.
+    """
     command = [sys.executable, "-m", "overlapper", *args]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         assert process.stderr.readline() == said + "\n"
+        if grown:
+            before = size_of(grown)
+            while size_of(grown) <= before and process.poll() is None:
+                time.sleep(0.01)
         time.sleep(after)
         process.send_signal(signal.SIGINT)
         output, complaints = process.communicate(timeout=30)
@@ -420,8 +431,9 @@ def test_ctrl_c_while_a_library_of_the_command_line_is_imported_is_one_line(libr
 @pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
 def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
     (tmp_path / "long.py").write_text(LONG)
-    output, _ = interrupted("run", "long.py", "--out", f"long.{ending}", said="a scene may talk", after=0.3)
-    steps = [row["step"] for row in read_table(tmp_path / f"long.{ending}")]
+    table = f"long.{ending}"
+    output, _ = interrupted("run", "long.py", "--out", table, said="a scene may talk", after=0.3, grown="*.unfinished*")
+    steps = [row["step"] for row in read_table(tmp_path / table)]
     assert steps == list(range(1, len(steps) + 1))
     said = re.search(r"Interrupted after step (\d+)", output)
     assert said is not None
