@@ -50,29 +50,29 @@ class Candidates {
           if (!stack_.quadric[q].ball) plane_along(stack_.line[i], stack_.quadric[q]);
       }
     }
-    if (stack_.quadrics == 2) {
-      const Quadric &p = stack_.quadric[0], &q = stack_.quadric[1];
+    for_pairs([&](const Quadric& p, const Quadric& q) {
       if (p.ball != q.ball) ball_and_cylinder(p.ball ? p : q, p.ball ? q : p);
       else if (parallel(p, q)) parallel_cylinders(p, q);
-    }
+    });
   }
 
-  /// Collects the values between low and high where a plane meets a corner of the two quadrics. False position finds
-  /// them between two samples on either side of the plane.
+  /// Collects the values between low and high where the corner of two sides of cylinders meets a plane or the ball, and
+  /// where the corner of a side and a plane meets the ball. False position finds them between two samples on either
+  /// side.
   void trace(double low, double high) {
-    const Quadric &p = stack_.quadric[0], &q = stack_.quadric[1];
-    if (stack_.quadrics < 2 || (!p.ball && !q.ball && parallel(p, q))) return;
+    bool crossing = false;
+    for_pairs([&](const Quadric& p, const Quadric& q) { crossing = crossing || p.ball || q.ball || !parallel(p, q); });
+    if (!crossing) return;
     find_samples(low, high);
+    const bool ball = stack_.ball >= 0;
     for (int i = 0; i < stack_.lines - 4; ++i) {
-      const Line& side = stack_.line[i];
-      if (plane(i) || (stack_.ball < 0 && side.quadric != 0)) continue;
-      if (stack_.ball >= 0) {
-        for (int j = 0; j < stack_.lines - 4; ++j)
-          if (plane(j)) corner_and_ball(i, j);
-        continue;
+      if (plane(i)) continue;
+      for (int j = 0; j < stack_.lines - 4; ++j) {
+        const bool sides = stack_.line[j].quadric > stack_.line[i].quadric;
+        if (!plane(j) && !sides) continue;
+        if (sides) corner_and_planes(i, j);
+        if (ball) corner_and_ball(i, j);
       }
-      for (int j = 0; j < stack_.lines - 4; ++j)
-        if (stack_.line[j].quadric == 1) corner_and_planes(i, j);
     }
   }
 
@@ -95,6 +95,13 @@ class Candidates {
       std::copy_n(samples_.begin() + row * kRow, kRow, t.begin());
       find_sides(stack_, t, {}, sides_[row]);
     }
+  }
+
+  /// Calls use(p, q) for every two quadrics.
+  template <class Use>
+  void for_pairs(Use use) const {
+    for (int i = 0; i < stack_.quadrics; ++i)
+      for (int j = i + 1; j < stack_.quadrics; ++j) use(stack_.quadric[i], stack_.quadric[j]);
   }
 
   bool plane(int i) const { return stack_.line[i].quadric < 0; }
@@ -159,7 +166,7 @@ class Candidates {
     }
   }
 
-  /// The corner of a plane and the side of a cylinder.
+  /// The corner of the side of a cylinder and a plane, or of the sides of two cylinders.
   void corner_and_ball(int i, int j) {
     const Point a = stack_.line[i].normal, b = stack_.line[j].normal;
     if (std::abs(cross(a, b)) < 1e-9 * stack_.line[j].length) return;
@@ -183,6 +190,7 @@ class Candidates {
     const auto between = [&](double low, double high, double at_low, double at_high) {
       if ((at_low < 0) != (at_high < 0)) add_zero(low, high, at_low, at_high, i, j, at);
     };
+    for (const bool first : {true, false}) add_turn_at_end(value, first, i, j, at, between);
     for (int k = 0; k + 1 < kSamples; ++k) {
       between(samples_[k], samples_[k + 1], value[k], value[k + 1]);
       if (k == 0) continue;
@@ -190,6 +198,27 @@ class Candidates {
       // In a symmetric pose, the samples on either side of the turn are equal.
       if (!(side * before > side * here && side * after >= side * here)) continue;
       add_turn({samples_[k - 1], samples_[k], samples_[k + 1]}, {before, here, after}, i, j, at, between);
+    }
+  }
+
+  /// The same for a turn between the first two or the last two samples. At an end of a cylinder, the function is a
+  /// series in the root of the distance from the end, and samples are even in that root. A parabola through three
+  /// samples finds the turn.
+  template <class Function, class Between>
+  void add_turn_at_end(const Samples& value, bool first, int i, int j, Function at, Between between) {
+    const int end = first ? 0 : kSamples - 1, next = first ? 1 : -1;
+    const double zero = value[end], one = value[end + next], two = value[end + 2 * next];
+    const double curve = zero - 2 * one + two, slope = (4 * one - 3 * zero - two) / 2;
+    if ((zero < 0) != (one < 0) || (zero < 0) != (curve < 0)) return;
+    const double turn = -slope / curve;
+    if (!(turn > 0 && turn < 1)) return;
+    const double t = samples_[end] + turn * turn * (samples_[end + next] - samples_[end]);
+    if (const double there = at(t); (there < 0) != (zero < 0)) {
+      between(samples_[end], t, zero, there), between(t, samples_[end + next], there, one);
+    } else if (first) {
+      add_turn({samples_[end], t, samples_[end + next]}, {zero, there, one}, i, j, at, between);
+    } else {
+      add_turn({samples_[end + next], t, samples_[end]}, {one, there, zero}, i, j, at, between);
     }
   }
 
