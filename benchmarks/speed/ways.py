@@ -17,7 +17,6 @@ from collections.abc import Callable
 from statistics import median
 from typing import NamedTuple
 
-import numpy as np
 from families import icosphere, prism
 
 from harness.bodies import has
@@ -34,8 +33,8 @@ TURN = (0.3, -0.5, 0.2, 0.8)
 ABOUT_Z = (0, 0, 0.1, 1)
 CUBE = Box([0.5, 0.5, 0.5])
 BALLS = {20 * 4**k: Hull(icosphere(k)) for k in (1, 2, 3, 4)}  # by their facets
-# A rounded hull around all others: whatever they share, they share with it, too.
-AROUND = Placed(RoundedHull(100 * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]), 1))
+# An ellipsoid around all others: whatever they share, they share with it, too.
+AROUND = Placed(Ellipsoid([100, 101, 102]))
 
 
 class Typical(NamedTuple):

@@ -367,44 +367,104 @@ WideVector point_inside(const OverlappingBodies& overlapping) {
 
 }  // namespace
 
-std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping, bool with_area) {
-  if (!choose(traits(overlapping.bodies)).tries(Way::kSlicing)) return std::nullopt;
-  const Arrangement& at = overlapping.at;
-  const WideVector inside = point_inside(overlapping);
-  const auto round = measure_by_slices({at.relative[0], at.relative[1], at.reference, inside, 0, with_area});
-  if (!round) return std::nullopt;
+namespace {
+
+/// The measures by slices, without pulls.
+MeasuresAndInertia by_slices(const pieces::RoundMeasures& round, Vec3 reference) {
   MeasuresAndInertia answer;
   Measures& m = answer.measures;
   m.status = Status::kOverlapping;
   m.way = Way::kSlicing;
-  m.facets_touched = round->facets_touched;
-  m.volume = round->volume, m.volume_error = round->volume_error, m.area = round->area;
-  m.area_error = round->area_error, m.area_known = round->area_known, m.rounding = round->rounding;
-  m.centroid = at.reference + round->centroid;
+  m.facets_touched = round.facets_touched;
+  m.volume = round.volume, m.volume_error = round.volume_error, m.area = round.area;
+  m.area_error = round.area_error, m.area_known = round.area_known, m.rounding = round.rounding;
+  m.centroid = reference + round.centroid;
+  answer.inertia = round.inertia, answer.inertia_error = round.inertia_error;
+  return answer;
+}
+
+pieces::SlicedGroup sliced_group(const OverlappingBodies& overlapping) {
+  return {overlapping.at.relative, overlapping.at.reference, point_inside(overlapping)};
+}
+
+/// The pull of the last body is opposite to the sum of all others, because area vectors of a closed surface add up to
+/// zero.
+std::optional<MeasuresAndInertia> sliced_as_group(const OverlappingBodies& overlapping) {
+  const Arrangement& at = overlapping.at;
+  const pieces::SlicedGroup group = sliced_group(overlapping);
+  const int bodies = static_cast<int>(at.order.size());
+  std::optional<MeasuresAndInertia> answer;
+  std::vector<Pull> pulls(bodies);
+  for (int i = 0; i + 1 < bodies; ++i) {
+    const auto round = pieces::measure_group(group, i);
+    if (!round) return std::nullopt;
+    if (!answer) answer = by_slices(*round, at.reference);
+    pulls[i] = round->pull;
+    pulls.back() += {-round->pull.force, -round->pull.moment};
+  }
+  answer->measures.pulls_of_group.resize(bodies);
+  for (int i = 0; i < bodies; ++i)
+    answer->measures.pulls_of_group[at.order[i]] =
+        about(pulls[i], at.reference, overlapping.bodies[at.order[i]].position);
+  return answer;
+}
+
+Spread spread_between(const pieces::RoundMeasures& large, const pieces::RoundMeasures& small, double area_error) {
+  const double of_rules = large.area_error + area_error + small.area_error;
+  const double first = std::abs(large.first_area - small.first_area);
+  const double second = std::abs((large.area - large.first_area) - (small.area - small.first_area));
+  return {std::max(0.0, large.volume - small.volume), std::max(0.0, large.area - small.area) + of_rules,
+          std::max(first, second) + of_rules};
+}
+
+/// All bodies move for volume and area. For the owned area, one body moves at a time.
+std::optional<Spread> spread_of_group(const OverlappingBodies& overlapping, double moved, double area_error) {
+  const pieces::SlicedGroup group = sliced_group(overlapping);
+  const auto between = [&](int first, int only) -> std::optional<Spread> {
+    const auto large = pieces::measure_group(group, first, {moved, only});
+    const auto small = pieces::measure_group(group, first, {-moved, only});
+    if (!large || !small) return std::nullopt;
+    return spread_between(*large, *small, area_error);
+  };
+  std::optional<Spread> all = between(0, -1);
+  for (int i = 0; all && i < static_cast<int>(group.bodies.size()); ++i) {
+    const auto alone = between(i, i);
+    if (!alone) return std::nullopt;
+    all->owned = std::max(all->owned, alone->owned);
+  }
+  return all;
+}
+
+}  // namespace
+
+std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping, bool with_area) {
+  if (!choose(traits(overlapping.bodies)).tries(Way::kSlicing)) return std::nullopt;
+  const Arrangement& at = overlapping.at;
+  if (at.order.size() > 2) return sliced_as_group(overlapping);
+  const WideVector inside = point_inside(overlapping);
+  const auto round = measure_by_slices({at.relative[0], at.relative[1], at.reference, inside, 0, with_area});
+  if (!round) return std::nullopt;
+  MeasuresAndInertia answer = by_slices(*round, at.reference);
   for (int i = 0; i < 2; ++i) {
     const double side = i == 0 ? 1 : -1;
     const int body = at.order[i];
-    m.pulls[body] =
+    answer.measures.pulls[body] =
         about({side * round->pull.force, side * round->pull.moment}, at.reference, overlapping.bodies[body].position);
   }
-  answer.inertia = round->inertia, answer.inertia_error = round->inertia_error;
   return answer;
 }
 
 std::optional<Spread> spread(const OverlappingBodies& overlapping, const Measures& sliced, const Measures& stated) {
   const Arrangement& at = overlapping.at;
+  const double moved = sliced.rounding + std::max(sliced.volume_error, stated.volume_error) / sliced.area;
+  if (at.order.size() > 2) return spread_of_group(overlapping, moved, sliced.area_error);
   const WideVector inside = point_inside(overlapping);
   const auto with_moved = [&](double outwards) {
     return measure_by_slices({at.relative[0], at.relative[1], at.reference, inside, outwards});
   };
-  const double moved = sliced.rounding + std::max(sliced.volume_error, stated.volume_error) / sliced.area;
   const auto large = with_moved(moved), small = with_moved(-moved);
   if (!large || !small) return std::nullopt;
-  const double of_rules = large->area_error + sliced.area_error + small->area_error;
-  const double first = std::abs(large->first_area - small->first_area);
-  const double second = std::abs((large->area - large->first_area) - (small->area - small->first_area));
-  return Spread{std::max(0.0, large->volume - small->volume), std::max(0.0, large->area - small->area) + of_rules,
-                std::max(first, second) + of_rules};
+  return spread_between(*large, *small, sliced.area_error);
 }
 
 std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, const Measures& measures) {

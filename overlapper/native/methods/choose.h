@@ -46,7 +46,7 @@ struct Choice {
 
 /// The choice of ways. The first line that fits counts, for single calls, batches and groups alike. Limits for facets
 /// and errors are in geometry/thresholds.h.
-inline constexpr std::array<Choice, 8> kChoices{{
+inline constexpr std::array<Choice, 9> kChoices{{
     {"two boxes or hulls of many facets",
      [](const Traits& t) { return t.many_facet_pairs && t.clippable; },
      {Way::kTracing, Way::kClipping, Way::kWideClipping, Way::kDual}},
@@ -67,6 +67,9 @@ inline constexpr std::array<Choice, 8> kChoices{{
      {Way::kSlicing, Way::kDual}},
     {"two, one of them a rounded hull, and no ellipsoid",
      [](const Traits& t) { return t.bodies == 2 && t.rounded && !t.stretched && !t.other; },
+     {Way::kSlicing, Way::kDual}},
+    {"three or more, at least one of them round, and no ellipsoid",
+     [](const Traits& t) { return t.bodies > 2 && (t.round || t.rounded) && !t.stretched && !t.other; },
      {Way::kSlicing, Way::kDual}},
     {"all others", [](const Traits&) { return true; }, {Way::kDual}},
 }};

@@ -5,6 +5,7 @@
 
 #include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/lenses/lenses.h"
+#include "methods/round/pieces/group.h"
 #include "methods/round/pieces/measure.h"
 
 namespace overlapper {

@@ -15,7 +15,7 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
   of_other.clear(), of_ellipsoid.clear();
   pieces::EnclosingPolytope common;
   const bool many = facets(other.shape) > 0;
-  if (many) pieces::enclose(other, ellipsoid, rounded(pair.inside), common);
+  if (many) pieces::enclose(std::to_array({&other, &ellipsoid}), rounded(pair.inside), common);
   pieces::cut(other, ellipsoid, many ? &common : nullptr, 1, pair.reference, pair.inside, of_other);
   pieces::cut(ellipsoid, other, nullptr, 0, pair.reference, pair.inside, of_ellipsoid);
   if (pair.outwards != 0 && !pieces::grow(of_other, pair.outwards)) return std::nullopt;

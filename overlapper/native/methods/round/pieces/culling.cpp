@@ -35,6 +35,13 @@ bool PlainRound::misses(const EnclosingPolytope& polytope, Vec3 middle, double m
   return normal != Vec3{} && polytope.least(normal) > reach(normal) + margin;
 }
 
+bool PlainRound::contains(const EnclosingPolytope& polytope, double margin) const {
+  return std::ranges::all_of(polytope.corners, [&](const EnclosingPolytope::Corner& corner) {
+    const Vec3 from = corner.at - centre;
+    return norm(from - dot(from, axis) * axis) < radius - margin;
+  });
+}
+
 void Culling::look_at(const Pieces& a, const Pieces& b, const EnclosingPolytope& common) {
   margin_ = 1e-13 * common.extent();
   enclose(a, common, a_);

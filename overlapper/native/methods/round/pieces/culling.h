@@ -20,6 +20,8 @@ struct PlainRound {
   double reach(Vec3 outward_normal) const { return dot(outward_normal, centre) + radius; }
   /// Whether a polytope lies beyond the plane that touches the round beside the polytope's middle.
   bool misses(const EnclosingPolytope& polytope, Vec3 middle, double margin) const;
+  /// Whether the round contains a polytope.
+  bool contains(const EnclosingPolytope& polytope, double margin) const;
 };
 
 /// Finds the pairs of pieces of two bodies that may share something, and the walls that matter for each pair. It

@@ -7,6 +7,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/scratch.h"
+#include "methods/round/pieces/best_sums.h"
 #include "methods/round/pieces/culling.h"
 #include "methods/round/pieces/mitred.h"
 #include "methods/round/pieces/parts.h"
@@ -14,10 +15,6 @@
 
 namespace overlapper::pieces {
 namespace {
-
-/// Largest fraction of a volume between planes that count as one. The second limit applies if nothing else closes the
-/// surface.
-constexpr double kLayer = 1e-12, kWideLayer = 1e-9;
 
 /// If a body has more planes, only the planes near the common set are used. The time of slices grows with the cube of
 /// the number of planes.
@@ -75,53 +72,6 @@ struct BothPieces {
   }
 };
 
-double off(const Totals& totals) { return totals.error + open_volume(totals); }
-
-/// Calls add(setting, sums) with several settings and keeps the sums with the least missing volume. No value if there
-/// is no volume.
-template <class Add>
-std::optional<Sums> best_sums(PieceSetting setting, const Sums& none, Add add) {
-  Sums best = none;
-  if (!add(setting, best)) return std::nullopt;
-  const auto try_again = [&] {
-    Sums again = none;
-    if (add(setting, again) && off(again.totals) < off(best.totals)) best = again;
-  };
-  const auto is_open = [&] { return !(open_volume(best.totals) <= kMostOpen * best.totals.volume); };
-  // If the surface does not close, something is hidden in an interval that was sampled in its middle only.
-  setting.closely = true;
-  if (is_open()) try_again();
-  // Or faces and cuts lie so near each other that only rounding orders them. They then count as one.
-  const auto try_layer = [&](double part) {
-    setting.layer = part * best.totals.volume / best.totals.area, setting.surface = best.totals.area;
-    try_again();
-  };
-  if (is_open()) try_layer(kLayer);
-  if (!(off(best.totals) <= kMostError * best.totals.volume)) try_layer(kWideLayer);
-  return best;
-}
-
-std::optional<RoundMeasures> measures_of(const Totals& totals, const BothPieces& both, Vec3 inside) {
-  RoundMeasures result;
-  result.volume = totals.volume;
-  result.volume_error = off(totals) + both.a.gaps + both.b.gaps;
-  if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
-  result.volume_error += (both.a.misplaced() + both.b.misplaced()) * totals.area;
-  result.area = totals.area, result.first_area = totals.first_area;
-  result.area_error =
-      totals.area_error + missing_area(totals.unbalanced, totals.border) + both.a.gap_area + both.b.gap_area;
-  result.rounding = rounding_of_surfaces(sum_of(totals.squares) / totals.volume) + both.a.rounding + both.b.rounding;
-  result.centroid = inside + totals.first / totals.volume;
-  result.inertia = totals.inertia_about_centroid();
-  // If a body is inside the other, the sum is zero but for rounding.
-  const Vec3 pull = norm(totals.pull) <= slicing::kSummation * totals.border ? Vec3{} : totals.pull;
-  result.pull = about(Pull{pull, totals.moment}, inside, {});
-  for (const Pieces* pieces : {&both.a, &both.b})
-    result.facets_touched += static_cast<int>(
-        std::ranges::count_if(pieces->walls, [](const Wall& wall) { return wall.owner != slicing::kCut; }));
-  return result;
-}
-
 PieceSetting setting_of(const SlicedPair& pair) {
   const Vec3 inside = rounded(pair.inside);
   PieceSetting setting;
@@ -138,7 +88,7 @@ std::optional<RoundMeasures> measure_both(const SlicedPair& pair, const PieceSet
   const std::optional<Sums> sums = best_sums(setting, none, add);
   if (!sums) return std::nullopt;
   if (pair.patch) *pair.patch = *sums->patch;
-  return measures_of(sums->totals, both, rounded(pair.inside));
+  return measures_of(sums->totals, std::to_array<const Pieces*>({&both.a, &both.b}), rounded(pair.inside));
 }
 
 using Numbers = std::array<int, 2>;  ///< of a piece of a and one of b
@@ -254,21 +204,7 @@ std::optional<RoundMeasures> measure_mitred(const SlicedPair& pair, const Enclos
   const Totals& totals = sums.totals;
   if (!(off(totals) <= kMostOpen * totals.volume)) return std::nullopt;
   if (pair.patch) *pair.patch = *sums.patch;
-  return measures_of(totals, both, rounded(pair.inside));
-}
-
-/// A polytope around the common set that is thin if the contact is shallow: it ends at the smooth body's plane nearest
-/// to the inner point.
-void enclose_closely(const SlicedPair& pair, EnclosingPolytope& around) {
-  const Vec3 inside = rounded(pair.inside);
-  enclose(pair.a, pair.b, inside, around);
-  const double margin =
-      1e-12 * (norm(inside) + norm(pair.a.pose.translation) + norm(pair.b.pose.translation) + around.extent());
-  for (const Placed* body : {&pair.a, &pair.b}) {
-    if (!smooth(body->shape)) continue;
-    const Plane plane = body->tightest(inside);
-    around.cut({plane.normal, margin - signed_distance(plane, inside), kNoWall});
-  }
+  return measures_of(totals, std::to_array<const Pieces*>({&both.a, &both.b}), rounded(pair.inside));
 }
 
 }  // namespace
@@ -276,7 +212,7 @@ void enclose_closely(const SlicedPair& pair, EnclosingPolytope& around) {
 std::optional<RoundMeasures> measure_pieces(const SlicedPair& pair) {
   const Scratch<FewPieces> pieces;
   const bool many = facets(pair.a.shape) + facets(pair.b.shape) > kManyPlanes;
-  if (many) enclose_closely(pair, pieces->around);
+  if (many) enclose_closely(std::to_array({&pair.a, &pair.b}), rounded(pair.inside), pieces->around);
   if (!pieces->both.become(pair, many ? &pieces->around : nullptr)) return std::nullopt;
   return measure_both(pair, setting_of(pair), pieces->both,
                       [&](const PieceSetting& setting, Sums& sums) { return pieces->add_all(setting, sums); });
@@ -284,7 +220,7 @@ std::optional<RoundMeasures> measure_pieces(const SlicedPair& pair) {
 
 std::optional<RoundMeasures> measure_culled_pieces(const SlicedPair& pair) {
   const Scratch<ManyPieces> pieces;
-  enclose(pair.a, pair.b, rounded(pair.inside), pieces->around);
+  enclose(std::to_array({&pair.a, &pair.b}), rounded(pair.inside), pieces->around);
   if (auto measures = measure_mitred(pair, pieces->around)) return measures;
   if (!pieces->both.become(pair, &pieces->around)) return std::nullopt;
   pieces->culling.look_at(pieces->both.a, pieces->both.b, pieces->around);

@@ -8,6 +8,9 @@
 namespace overlapper::pieces {
 namespace {
 
+/// The centre of a ball, or the point of a cylinder's axis that is nearest to the origin.
+WideVector middle(const Round& round) { return round.ball ? round.centre : foot(round); }
+
 /// Planes at most this far from each other, relative to the extent, are in one slab.
 constexpr double kOneSlab = 1e-6;
 
@@ -52,7 +55,7 @@ bool nicks(const Wall& wall, std::span<const Round> rounds, double extent, Total
 /// Drops a cylinder that contains the other round, because it cuts nothing off. Where the cylinder touches that round
 /// from outside along a line, slices would show only rounding. The part that sticks out counts as an error.
 void drop_around(std::vector<Round>& rounds, Totals& totals) {
-  if (rounds.size() < 2) return;
+  if (rounds.size() != 2) return;
   for (int i = 0; i < 2; ++i) {
     const Round &outer = rounds[i], &inner = rounds[1 - i];
     if (outer.ball) continue;
@@ -69,24 +72,15 @@ void drop_around(std::vector<Round>& rounds, Totals& totals) {
   }
 }
 
-/// If two balls cross, the radical plane cuts the common set in two. Each part is the part of one ball beyond the
-/// plane.
+/// If two balls cross, each part on a side of their radical plane is the part of one ball.
 bool add_balls(const Round& a, const Round& b, std::span<const Wall> walls, const EnclosingPolytope* around,
                const PieceSetting& setting, Sums& sums) {
-  const WideVector between = a.centre - b.centre;
-  const DoubleDouble distance = norm(between);
-  if (!(distance.head > std::abs(a.radius - b.radius)))
-    return add_piece(std::span(a.radius < b.radius ? &a : &b, 1), walls, around, setting, sums);
-  const auto power = [](const Round& r) {
-    const DoubleDouble d = norm(r.centre), radius{r.radius};
-    return (d - radius) * (d + radius);
-  };
-  const DoubleDouble slack = (power(a) - power(b)) / (DoubleDouble{2} * distance);
-  const WideVector normal = unit(between);
+  const std::optional<Wall> between = radical_plane(a, b);
+  if (!between) return add_piece(std::span(a.radius < b.radius ? &a : &b, 1), walls, around, setting, sums);
   std::vector<Wall> with(walls.begin(), walls.end());
-  with.push_back({normal, slack, slicing::kCut});
+  with.push_back(*between);
   if (!add_piece(std::span(&a, 1), with, around, setting, sums)) return false;
-  with.back() = {-normal, -slack, slicing::kCut};
+  with.back() = {-between->normal, -between->slack, slicing::kCut};
   return add_piece(std::span(&b, 1), with, around, setting, sums);
 }
 
@@ -146,6 +140,18 @@ bool add_placed(const SlicedPiece& piece, const PieceSetting& setting, Sums& sum
 }
 
 }  // namespace
+
+std::optional<Wall> radical_plane(const Round& a, const Round& b) {
+  const WideVector p = middle(a), q = middle(b), between = p - q;
+  const DoubleDouble distance = norm(between);
+  if (!(distance.head > std::abs(a.radius - b.radius))) return std::nullopt;
+  const auto power = [](const WideVector& centre, double r) {
+    const DoubleDouble d = norm(centre), radius{r};
+    return (d - radius) * (d + radius);
+  };
+  const DoubleDouble slack = (power(p, a.radius) - power(q, b.radius)) / (DoubleDouble{2} * distance);
+  return Wall{unit(between), slack, slicing::kCut};
+}
 
 bool add_piece(std::span<const Round> rounds, std::span<const Wall> walls, const EnclosingPolytope* around,
                const PieceSetting& setting, Sums& sums) {

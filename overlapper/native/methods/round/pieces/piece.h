@@ -4,10 +4,14 @@
 
 namespace overlapper::pieces {
 
-/// Adds the part of at most two rounds inside the walls. `around` contains that part, if known. False if slices give
-/// up.
+/// Adds the part of some rounds inside the walls: at most two of them, or two cylinders that are not parallel and a
+/// ball. `around` contains that part, if known. False if slices give up.
 bool add_piece(std::span<const Round> rounds, std::span<const Wall> walls, const EnclosingPolytope* around,
                const PieceSetting& setting, Sums& sums);
+
+/// The plane where two balls, or two parallel cylinders, have the same power: on its inner side the first round is the
+/// nearer border of what both share. No value if one round contains the other, seen along the axes.
+std::optional<Wall> radical_plane(const Round& a, const Round& b);
 
 /// Adds a ball, or the part of it inside one wall, in closed form about the cap's point that is farthest from the wall.
 void add_cap(const Round& ball, const Wall* wall, const PieceSetting& setting, Sums& sums);
@@ -17,8 +21,8 @@ void add_cap(const Round& ball, const Wall* wall, const PieceSetting& setting, S
 bool add_in_polytope(const Round* round, const EnclosingPolytope& polytope, const DistinctWalls& distinct,
                      const PieceSetting& setting, Sums& sums);
 
-/// The part of at most two rounds inside the walls. The rounds are not both balls. Coordinates are relative to an own
-/// point.
+/// The part of some rounds inside the walls: at most two cylinders, and then at most one ball. Coordinates are relative
+/// to an own point.
 struct SlicedPiece {
   std::vector<Round> rounds;
   std::vector<Wall> walls;

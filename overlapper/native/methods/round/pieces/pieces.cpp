@@ -165,17 +165,30 @@ double extent(const Placed& body, Vec3 point) {
   return norm(body.pose.translation - point) + reach(body.shape);
 }
 
-void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& result) {
-  const Bounds p = bounds(a), q = bounds(b);
-  const Vec3 lower = max(p.lower, q.lower) - inside, upper = min(p.upper, q.upper) - inside;
+namespace {
+
+double with_places(double size, std::span<const Placed* const> bodies) {
+  for (const Placed* body : bodies) size += norm(body->pose.translation);
+  return size;
+}
+
+}  // namespace
+
+void enclose(std::span<const Placed* const> bodies, Vec3 inside, EnclosingPolytope& result) {
+  Bounds box = bounds(*bodies[0]);
+  for (const Placed* body : bodies.subspan(1)) {
+    const Bounds other = bounds(*body);
+    box = {max(box.lower, other.lower), min(box.upper, other.upper)};
+  }
+  const Vec3 lower = box.lower - inside, upper = box.upper - inside;
   const Vec3 size = max(abs(lower), abs(upper));
-  const double margin = 1e-12 * (norm(size) + norm(inside) + norm(a.pose.translation) + norm(b.pose.translation));
+  const double margin = 1e-12 * with_places(norm(size) + norm(inside), bodies);
   const Vec3 wider = margin * Vec3{1, 1, 1};
   result.become({lower - wider, upper + wider});
   const double farthest = result.extent();
   thread_local std::vector<EnclosingPolytope::Face> planes;
   planes.clear();
-  for (const Placed* body : {&a, &b}) {
+  for (const Placed* body : bodies) {
     const Vec3 origin = body->pose.translation - inside;
     const auto add = [&](const Plane& plane, double more) {
       cancellation_point();
@@ -197,6 +210,16 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
     result.cut(plane);
   }
   result.drop_faces();
+}
+
+void enclose_closely(std::span<const Placed* const> bodies, Vec3 inside, EnclosingPolytope& result) {
+  enclose(bodies, inside, result);
+  const double margin = 1e-12 * (with_places(norm(inside), bodies) + result.extent());
+  for (const Placed* body : bodies) {
+    if (!smooth(body->shape)) continue;
+    const Plane plane = body->tightest(inside);
+    result.cut({plane.normal, margin - signed_distance(plane, inside), kNoWall});
+  }
 }
 
 void cut(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,

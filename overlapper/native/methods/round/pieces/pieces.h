@@ -40,9 +40,12 @@ struct Pieces {
 /// Upper bound of the distance of a body's points from a point.
 double extent(const Placed& body, Vec3 point);
 
-/// A polytope around the common set of two bodies, one of them bounded, relative to `inside`. It is a box cut by the
-/// planes of both bodies nearest to `inside`, and a little larger.
-void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& result);
+/// A polytope around the common set of some bodies, one of them bounded, relative to `inside`. It is a box cut by the
+/// planes of the bodies nearest to `inside`, and a little larger.
+void enclose(std::span<const Placed* const> bodies, Vec3 inside, EnclosingPolytope& result);
+
+/// The same, also cut by each smooth body's plane nearest to `inside`. It is thin if the contact is shallow.
+void enclose_closely(std::span<const Placed* const> bodies, Vec3 inside, EnclosingPolytope& result);
 
 /// Cuts a body into pieces. Pieces and walls that `other` does not reach are left out, and so are pieces outside
 /// `common`, the polytope around the common set, if known. Bodies are about a reference, at `reference` in the world.

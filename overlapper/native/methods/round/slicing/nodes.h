@@ -14,7 +14,7 @@ using Row = std::array<double, kRow>;
 
 /// Half the chord of each slice, per quadric, and the sides of a cylinder or the disc.
 struct Sides {
-  std::array<Row, 2> half, upper, lower;
+  std::array<Row, kMostRounds> half, upper, lower;
   Row centre_x, centre_y, slack;  ///< of the disc; |centre|² − radius²
 };
 /// Each t has a tail, as in double-double. Near the ends of a round, half a chord is the square root of the distance of

@@ -11,6 +11,9 @@
 
 namespace overlapper::slicing {
 
+/// The largest number of rounds of a stack: two cylinders that are not parallel, and a ball.
+inline constexpr int kMostRounds = 3;
+
 /// A point of a slice.
 struct Point {
   double x = 0, y = 0;
@@ -116,7 +119,7 @@ struct View {
 struct Stack {
   std::array<Line, kMostLines + 8> line;
   int lines = 0;
-  std::array<Quadric, 2> quadric;
+  std::array<Quadric, kMostRounds> quadric;
   int quadrics = 0;
   int ball = -1;                              ///< number of the ball among the quadrics, or -1
   double low = 0, high = 0;                   ///< slices lie between these values of t, if there are any
@@ -143,9 +146,9 @@ struct Slice {
 
   const Stack& stack;
   double t;
-  std::array<double, 2> half_chord{}, upper{}, lower{};  ///< per quadric; upper and lower only for cylinders
-  Point centre;                                          ///< of the disc
-  double slack = 0, radius = 0;                          ///< |centre|² − radius²
+  std::array<double, kMostRounds> half_chord{}, upper{}, lower{};  ///< per quadric; upper and lower only for cylinders
+  Point centre;                                                    ///< of the disc
+  double slack = 0, radius = 0;                                    ///< |centre|² − radius²
 
   double side(int line) const {
     const Line& l = stack.line[line];

@@ -154,12 +154,13 @@ bool even(const Axes& axes, std::span<const Wall> walls) {
   });
 }
 
+bool two_cylinders(std::span<const Round> rounds) { return rounds.size() > 1 && !rounds[0].ball && !rounds[1].ball; }
+
 /// The axes number `way` among the suitable turns. If no turn is suitable, number 0 is the first turn. The slices of
 /// two cylinders whose axes are not parallel cannot be turned.
 std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall> walls, int way) {
   const Axes first = choose(rounds, walls, 0);
-  const bool fixed = rounds.size() == 2 && !rounds[0].ball && !rounds[1].ball &&
-                     norm(cross(rounds[0].axis, rounds[1].axis)).head > kOneDirection;
+  const bool fixed = two_cylinders(rounds) && norm(cross(rounds[0].axis, rounds[1].axis)).head > kOneDirection;
   int suit = 0;
   for (const double tangent : kTurns) {
     const Axes axes = tangent == 0 ? first : choose(rounds, walls, tangent);
@@ -240,7 +241,7 @@ void add_round(Stack& stack, const Round& r, const Axes& axes) {
 
 std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall> walls, Vec3 point) {
   std::vector<Rushing> found;
-  if (rounds.size() != 2 || rounds[0].ball || rounds[1].ball) return found;
+  if (!two_cylinders(rounds)) return found;
   const Vec3 across = rounded(unit(cross(rounds[0].axis, rounds[1].axis)));
   for (const Wall& wall : walls) {
     const Vec3 normal = rounded(wall.normal);

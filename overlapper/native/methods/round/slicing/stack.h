@@ -11,9 +11,9 @@ namespace overlapper::slicing {
 /// The largest number of directions for slices.
 inline constexpr int kAxes = 5;
 
-/// The slices, orthogonal to every cylinder's axis, of the part of at most two rounds inside walls. The rounds are not
-/// both balls. `extent` is an upper bound of the distance of the part's points from the origin. `way` 0 is the most
-/// suitable direction of slices. No value if there are too many walls, or fewer directions.
+/// The slices, parallel to every cylinder's axis, of the part of some rounds inside walls. The rounds are at most two
+/// cylinders, and then at most one ball. `extent` is an upper bound of the distance of the part's points from the
+/// origin. `way` 0 is the most suitable direction of slices. No value if there are too many walls, or fewer directions.
 std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way);
 
 /// A plane that is nearly, but not quite, parallel to the slices of two cylinders. Such slices cannot be turned, so the

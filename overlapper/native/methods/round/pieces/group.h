@@ -1,0 +1,30 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "methods/round/pieces/measure.h"
+
+namespace overlapper::pieces {
+
+/// Three or more bodies that overlap: balls, capsules, cylinders, rounded hulls and polyhedra.
+struct SlicedGroup {
+  std::span<const Placed> bodies;  ///< about the reference
+  Vec3 reference;
+  WideVector inside;  ///< a point of the common set about the reference, as deep inside as known
+};
+
+/// How far the surfaces of a group are moved out.
+struct MovedOut {
+  double outwards = 0;  ///< m
+  int only = -1;        ///< the only body that is moved; -1 for all bodies
+};
+
+/// The measures of a group. `pull` and `first_area` are those of the body `first`; the others count as one body.
+///
+/// Bodies are cut into pieces as for pairs. Where surfaces of two balls, or of two parallel cylinders, cross, a plane
+/// cuts the common set in two parts, and each round bounds one part alone (power diagram; Aurenhammer 1987). If a
+/// part has more than two cylinders after that, there is no value.
+std::optional<RoundMeasures> measure_group(const SlicedGroup& group, int first, const MovedOut& moved = {});
+
+}  // namespace overlapper::pieces
