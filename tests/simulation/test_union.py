@@ -139,6 +139,39 @@ def test_the_error_holds_for_spheres_in_either_way():
         assert abs(found.volume - fine.volume) <= found.volume_error + fine.volume_error
 
 
+def nearest_parts(centres, radii):
+    """The volume of a union of balls as a sum of disjoint parts: where each ball is nearest, by power."""
+    volume = 0.0
+    for centre, radius in zip(centres, radii):
+        walls = []
+        for other, its_radius in zip(centres, radii):
+            if (other != centre).any():
+                apart = np.linalg.norm(other - centre)
+                power = other @ other - centre @ centre - its_radius**2 + radius**2
+                walls.append(Placed(HalfSpace((other - centre) / apart, power / (2 * apart))))
+        volume += overlap(Placed(Sphere(radius), centre), *walls).volume
+    return volume
+
+
+@pytest.mark.parametrize(("balls", "spread"), [(24, 1.0), (24, 1.5), (9, 0.2)])
+def test_a_union_of_balls_is_exact(balls, spread):
+    rng = np.random.default_rng(balls)
+    centres, radii = spread * rng.normal(size=(balls, 3)), rng.uniform(0.4, 0.8, balls)
+    volume, error = union_volume([Placed(Sphere(radius), centre) for radius, centre in zip(radii, centres)])
+    exact = nearest_parts(centres, radii)
+    assert error <= 1e-10 * exact
+    assert volume == pytest.approx(exact, rel=1e-12)
+
+
+def test_cells_of_smooth_shapes_state_the_space_beside_them(monkeypatch):
+    rng = np.random.default_rng(2)
+    centres, radii = 0.2 * rng.normal(size=(8, 3)), rng.uniform(0.4, 0.8, 8)
+    monkeypatch.setattr(union, "SMOOTH_TERMS", 1)
+    volume, error = union_volume([Placed(Sphere(radius), centre) for radius, centre in zip(radii, centres)])
+    exact = nearest_parts(centres, radii)
+    assert 0.001 * exact < abs(volume - exact) <= error
+
+
 def test_unions_apart_share_nothing():
     found = of_pairs([Placed(Box([1, 1, 1]))], [Placed(Box([1, 1, 1]), [5, 0, 0])], {})
     assert not found and found.volume == found.volume_error == found.terms == 0
