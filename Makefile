@@ -13,6 +13,8 @@ NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
 # Least coverage in percent: lines and branches of Python; lines of the core.
 LEAST_OF_PYTHON := 86
 LEAST_OF_CORE := 90
+# Images of containers often set this. Then each of the tests' thousands of processes would compile its imports anew.
+unexport PYTHONDONTWRITEBYTECODE
 # Tests that start a Ray cluster of several nodes, which takes a sixth of the time of all tests.
 CLUSTER := tests/sweep/test_ray_nodes.py
 # Coverage of the core: its object files, its tests, and tests that fail in a build with counters.

@@ -1,5 +1,6 @@
 """CONTRIBUTING is true: the files and names that it names exist, its lists are short, and versions agree."""
 
+import os
 import re
 import subprocess
 from importlib import metadata
@@ -55,6 +56,15 @@ def test_help_lists_every_target_that_is_made_by_hand():
     makefile = (ROOT / "Makefile").read_text()
     phony = re.search(r"^\.PHONY: (.*)", makefile, re.MULTILINE)[1].split()
     assert list(make_targets()) == phony
+
+
+def test_make_lets_python_write_bytecode_where_the_environment_forbids_it(tmp_path):
+    rules = f"include {ROOT / 'Makefile'}\n.PHONY: environment\nenvironment: ; @env\n"
+    (tmp_path / "probe.mk").write_text(rules)
+    forbidden = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "OTHER_OF_THE_ENVIRONMENT": "1"}
+    make = ["make", "--silent", "--no-print-directory", "--file", str(tmp_path / "probe.mk"), "environment"]
+    names = [line.partition("=")[0] for line in subprocess.check_output(make, env=forbidden, text=True).splitlines()]
+    assert "OTHER_OF_THE_ENVIRONMENT" in names and "PYTHONDONTWRITEBYTECODE" not in names
 
 
 def test_hooks_have_the_formatters_of_the_environment():
