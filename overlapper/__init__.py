@@ -1,6 +1,5 @@
 """The volume that convex bodies share, with an error bound, centroid, normal, depth, patch and gradient."""
 
-from importlib.metadata import version as _version
 from typing import TYPE_CHECKING
 
 from overlapper._core import (
@@ -37,10 +36,10 @@ if TYPE_CHECKING:
     from overlapper.polytopes.random import random_polytope
     from overlapper.scenes.watching import Watch
     from overlapper.tables.log import Log as Log
+    from overlapper.version import __version__ as __version__
 
     watch = Watch
 
-__version__ = _version("overlapper")
 __all__ = [
     "Batch",
     "Box",
@@ -90,7 +89,8 @@ for _kind in (
 del _kind
 
 # These names are imported on first access. The pytest plugin is a module of this package, so an import of numpy here
-# would delay every start of pytest. An import by * leaves out names that need more than numpy.
+# would delay every start of pytest. The module that knows the version would take half of the import of this package. An
+# import by * leaves out names that need more than numpy.
 __getattr__ = _lazily(
     __name__,
     {
@@ -98,6 +98,7 @@ __getattr__ = _lazily(
         "polytopes.mesh_file": ("read_hull", "write_mesh"),
         "polytopes.random": ("random_polytope",),
         "tables.log": ("Log",),
+        "version": ("__version__",),
         "watch": ("watch",),
     },
 )

@@ -43,6 +43,12 @@ def contracts(folder: Path) -> tuple[int, str]:
     return done.returncode, done.stdout + done.stderr
 
 
+def test_the_package_imports_neither_numpy_nor_what_knows_its_version():
+    program = "import sys, overlapper; print(*{'numpy', 'importlib.metadata'} & {*sys.modules})"
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert loaded.split() == []
+
+
 def test_python_imports_only_downwards_and_each_library_in_one_room():
     code, report = contracts(ROOT)
     assert code == 0, report
