@@ -14,6 +14,7 @@ from sweeping import BALLS, rows, sweep_of, swept
 from overlapper.jobs.hand import Done
 from overlapper.sweep import comparison as comparison_module
 from overlapper.sweep import page
+from overlapper.sweep import sweep as sweep_module
 from overlapper.sweep.comparison import Recorded
 from overlapper.sweep.measures import Measures
 from overlapper.sweep.part import TASKS, digest, parts
@@ -139,6 +140,7 @@ class AtOnce:
 def test_the_memory_of_a_comparison_hardly_grows_with_the_tasks(monkeypatch):
     """A row as a dictionary takes some thousand bytes."""
     monkeypatch.setattr(comparison_module, "BLOCK", 500)
+    monkeypatch.setattr(sweep_module, "PARTS", 40)  # each part is a file, which costs milliseconds per block
     peaks = []
     for count in (1000, 4000):
         grids = [f"apart=0.1:0.2:{count // 4}", "seed=0,1,2,3"]
