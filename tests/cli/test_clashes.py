@@ -13,6 +13,7 @@ import bearing
 import numpy as np
 import pytest
 import trimesh
+from command import overlapper
 from in_mm import CUBE, L_SHAPE
 from pages import Film, drawings, enclosed, meshes, numbers
 from step_text import step_text
@@ -55,14 +56,13 @@ def coacd_is(tmp_path, monkeypatch):
     def replace(source):
         (tmp_path / "fake").mkdir()
         (tmp_path / "fake" / "coacd.py").write_text(source)
-        monkeypatch.setenv("PYTHONPATH", str(tmp_path / "fake"))
+        monkeypatch.syspath_prepend(tmp_path / "fake")  # which the processes that decompose are given
 
     return replace
 
 
 def clashes(*arguments):
-    command = [sys.executable, "-m", "overlapper", "clashes", "--units", "mm", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+    return overlapper("clashes", "--units", "mm", *arguments)
 
 
 def facts(*arguments):
@@ -445,8 +445,9 @@ def test_a_file_that_cannot_be_read_is_the_only_sentence_where_too_few_bodies_ar
     assert (done.returncode, done.stderr) == (2, said)
 
 
-def test_ctrl_c_ends_the_command_in_one_sentence(coacd_is):
+def test_ctrl_c_ends_the_command_in_one_sentence(tmp_path, monkeypatch, coacd_is):
     coacd_is("import time; time.sleep(60)")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "fake"))
     command = [
         sys.executable,
         "-m",
