@@ -2,13 +2,13 @@
 
 import json
 import sqlite3
-import subprocess
 import sys
 from contextlib import closing
 from xml.etree import ElementTree
 
 import pyarrow.parquet
 import pytest
+from command import overlapper
 from pages import Film
 from robots import joint, limit, link, mimic, turntable, urdf
 
@@ -33,8 +33,7 @@ def robot(tmp_path, monkeypatch):
 
 
 def run(*arguments):
-    given = [sys.executable, "-m", "overlapper", "audit", "--configurations", str(COUNT), *map(str, arguments)]
-    done = subprocess.run(given, capture_output=True, text=True, timeout=120)
+    done = overlapper("audit", "--configurations", COUNT, *arguments)
     return done.returncode, done.stdout, done.stderr
 
 

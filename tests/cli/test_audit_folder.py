@@ -2,11 +2,11 @@
 
 import csv
 import json
-import subprocess
 import sys
 
 import pytest
 import trimesh
+from command import overlapper
 from in_mm import CUBE, L_SHAPE
 from robots import turntable
 
@@ -50,8 +50,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def run(*arguments):
-    given = [sys.executable, "-m", "overlapper", "audit", *map(str, arguments)]
-    done = subprocess.run(given, capture_output=True, text=True, timeout=120)
+    done = overlapper("audit", *arguments)
     return done.returncode, done.stdout
 
 

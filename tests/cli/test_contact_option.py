@@ -2,12 +2,11 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pyarrow.parquet
 import pytest
+from command import overlapper as run
 
 from overlapper.tables.table_file import read_table
 
@@ -41,7 +40,7 @@ def cube(tmp_path, monkeypatch):
 
 
 def overlapper(*arguments, code=0):
-    done = subprocess.run([sys.executable, "-m", "overlapper", *arguments], capture_output=True, text=True, timeout=60)
+    done = run(*arguments)
     assert done.returncode == code, done.stderr
     return done
 

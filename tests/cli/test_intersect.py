@@ -2,12 +2,11 @@
 
 import json
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 import trimesh
+from command import overlapper as run
 from numpy.testing import assert_allclose
 
 import overlapper
@@ -91,8 +90,7 @@ def files(tmp_path, monkeypatch):
 
 
 def intersect(*arguments):
-    command = [sys.executable, "-m", "overlapper", "intersect", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+    return run("intersect", *arguments)
 
 
 def test_two_mesh_files_share_a_volume_and_a_mesh():

@@ -1,10 +1,9 @@
 """Parameters of a scene: read from what build takes, set from outside, and said in the heading of every table."""
 
 import json
-import subprocess
-import sys
 
 import pytest
+from command import overlapper
 
 from overlapper.cli.options import given_parameters
 from overlapper.cli.refusals import Refused
@@ -41,10 +40,6 @@ def balls(tmp_path, monkeypatch):
     path = tmp_path / "balls.py"
     path.write_text(BALLS)
     return path
-
-
-def overlapper(*arguments):
-    return subprocess.run([sys.executable, "-m", "overlapper", *arguments], capture_output=True, text=True, timeout=60)
 
 
 def test_parameters_are_what_build_takes_with_a_default_that_is_a_number_a_text_or_a_truth(balls):

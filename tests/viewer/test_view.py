@@ -1,14 +1,13 @@
 """`overlapper view`: a scene, or a table of one, is seen as a page, as a picture, or live."""
 
 import re
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from command import overlapper
 from pages import Film
 from PIL import Image
 
@@ -47,11 +46,6 @@ def scene_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "press.py").write_text(PRESS)
     return tmp_path / "press.py"
-
-
-def overlapper(*arguments):
-    command = [sys.executable, "-m", "overlapper", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
 
 def colours(path):
