@@ -8,6 +8,7 @@ import contextlib
 import doctest
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -21,6 +22,8 @@ PAGES = [str(page.relative_to(ROOT)) for page in (ROOT / "README.md", *sorted((R
 BLOCK = re.compile(r"^```([^`\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # .ci/run runs the commands that make the environment. test_live.py runs the commands that wait for Ctrl-C.
 ELSEWHERE = re.compile(r"(make|python3 -m venv|\. env/bin/activate|pip install|conda install)\b|.* --live\b")
+# Commands that run no scene and no script share the process of their page: trimesh alone takes a second to import.
+SHARES_THE_PROCESS = re.compile(r"overlapper (audit|clashes|intersect|shapes)\b")
 # These exit with 1 if something overlaps, has moved or is skipped.
 ANSWERS_BY_EXIT_CODE = re.compile(r"overlapper (audit|clashes|check|diff|shapes)\b|pytest\b")
 
@@ -68,10 +71,20 @@ def shell(page, command):
     """The output of the command. A command that fails ends the page."""
     if ELSEWHERE.match(command):
         return ""
-    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=300)
+    if SHARES_THE_PROCESS.match(command) and not of_the_shell(command):
+        from command import overlapper
+
+        done = overlapper(*shlex.split(command, comments=True)[1:])
+    else:
+        done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=300)
     if done.returncode not in ((0, 1) if ANSWERS_BY_EXIT_CODE.match(command) else (0,)) or "Traceback" in done.stderr:
         sys.exit(f"{page}: {command} ended with {done.returncode}\n{done.stdout}{done.stderr}")
     return done.stdout
+
+
+def of_the_shell(command):
+    """Whether a command has more than words, quoted words and a comment."""
+    return re.search(r"[|&;<>$`*?~\\\[{]", re.sub(r"""#.*|"[^"$`\\]*"|'[^']*'""", "", command))
 
 
 def meshes(folder):
@@ -185,10 +198,24 @@ def test_a_page_that_does_not_run_is_reported(block, why, tmp_path):
     assert done.returncode == 1 and why in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("command", "shell"),
+    [
+        ('overlapper clashes parts --expect "bolt*,plate*"  # glTF, 3MF; or STEP', False),
+        ("overlapper clashes parts/*.stl", True),
+        ("overlapper audit arm.urdf > pairs.txt", True),
+        ('overlapper audit "$ROBOT"', True),
+    ],
+)
+def test_a_command_of_the_shell_is_given_to_it(command, shell):
+    assert bool(of_the_shell(command)) == shell
+
+
 def test_output_that_differs_between_runs_may_be_left_out(tmp_path):
     (tmp_path / "page.md").write_text("```console\n$ echo '1.50 s, 4 pairs'\n... s, 4 pairs\n$ echo 2\n2\n```\n")
     subprocess.run([sys.executable, __file__, tmp_path / "page.md"], check=True)
 
 
 if __name__ == "__main__":
+    sys.path.append(str(ROOT / "tests" / "support"))
     run(sys.argv[1])
