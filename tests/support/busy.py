@@ -4,7 +4,7 @@ import subprocess
 import sys
 import time
 
-IDLE = 0.25  # s that a process with numpy takes to start where nothing else runs
+IDLE = 0.15  # s that a process with numpy, whose bytecode is there, takes to start where nothing else runs
 
 
 def slowness():
