@@ -130,7 +130,7 @@ def corners(sizes: ArrayLike, positions: ArrayLike | None = None, orientations: 
         As for `boxes`.
     """
     made = boxes(sizes, positions, orientations)
-    local = UNIT_CORNERS * np.asarray(_array(sizes), dtype=float)[:, None]
+    local = UNIT_CORNERS * np.reshape(_array(sizes), (-1, 1, 3))
     return np.asarray(np.einsum("nij,nkj->nki", made.rotations, local) + made.positions[:, None])
 
 
@@ -469,7 +469,7 @@ def volume_gradient(
     Raises
     ------
     ValueError
-        As for `volume`, or if the weights do not fit.
+        As for `volume`, or if the weights do not fit or are not finite.
 
     Examples
     --------
@@ -482,13 +482,15 @@ def volume_gradient(
     of_a, of_b = _shapes(a, "a"), _shapes(b, "b")
     if weights is None:
         weights = np.ones(len(of_a) if aligned else (len(of_a), len(of_b)))
-    found = _core.volume_gradients(of_a, of_b, _array(weights), aligned, 1e-3, threads)
-    plane, turn = (slice(2), slice(2, 3)) if of_a.kind == "rectangles" else (slice(3), slice(3))
+    weights = _array(weights)
+    found = _core.volume_gradients(of_a, of_b, weights, aligned, 1e-3, threads)
+    if not np.isfinite(np.asarray(weights, dtype=float)).all():
+        raise ValueError("weights must be finite")
     one, other = (
         Gradient(
             by[0][:, : SIZES[rows.kind]] / (2 if rows.kind in ("boxes", "rectangles") else 1),
-            by[1][:, plane],
-            by[2][:, turn],
+            by[1][:, : 2 if rows.kind == "rectangles" else 3],
+            by[2][:, 2 if rows.kind == "rectangles" else 0 :],
         )
         for rows, by in zip((of_a, of_b), found)
     )
@@ -512,8 +514,8 @@ def _shapes(given: Shapes, name: str) -> ShapeArray:
     try:
         array = np.asarray(_array(given), dtype=float)
     except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.ndim == 3 and array.shape[1:] == (8, 3):
+        array = np.empty(1)
+    if array.shape == (0,) or array.shape[1:] == (8, 3):
         return _of_corners(array, name)
     if array.ndim == 2 and array.shape[1] == 5:
         return _core.rectangles(array, name)

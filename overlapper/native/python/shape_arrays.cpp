@@ -9,6 +9,9 @@ namespace {
 
 using Cube = nb::ndarray<nb::numpy, const double, nb::ndim<3>>;
 
+/// An empty list, which has no columns. It stands for no rows of any length.
+bool no_rows(const Doubles& array) { return array.ndim() == 1 && array.shape(0) == 0; }
+
 /// Numbers in rows of one length; a row of one number is an entry of a flat array.
 struct Rows {
   Doubles array;
@@ -20,7 +23,7 @@ struct Rows {
         name(std::move(called)),
         columns(in_a_row) {
     const bool flat = columns == 1;
-    if (array.ndim() != (flat ? 1 : 2) || (!flat && array.shape(1) != columns))
+    if (!no_rows(array) && (array.ndim() != (flat ? 1 : 2) || (!flat && array.shape(1) != columns)))
       fail(name, "must be an array of numbers of shape " + expected + ", not of shape " + shape_text(array));
   }
 
@@ -58,7 +61,7 @@ std::vector<Quaternion> to_quaternions(nb::handle given, size_t n, const char* o
   const nb::object numbers = nb::hasattr(given, "as_quat") ? given.attr("as_quat")() : nb::borrow(given);
   const Doubles array = to_doubles(numbers, name, expected);
   const bool matrices = array.ndim() == 3 && array.shape(1) == 3 && array.shape(2) == 3;
-  if (!matrices && (array.ndim() != 2 || array.shape(1) != 4))
+  if (!matrices && !no_rows(array) && (array.ndim() != 2 || array.shape(1) != 4))
     fail(name, "must be " + expected + ", not of shape " + shape_text(array));
   if (array.shape(0) != n)
     fail(name,
@@ -152,7 +155,7 @@ double most_off(const FittedBox& box, const BoxCorners& corners) {
 nb::tuple fit_boxes(nb::handle given, const std::string& name) {
   const std::string expected = "an array of numbers of shape (n, 8, 3)";
   const Doubles array = to_doubles(given, name, expected);
-  if (array.ndim() != 3 || array.shape(1) != 8 || array.shape(2) != 3)
+  if (!no_rows(array) && (array.ndim() != 3 || array.shape(1) != 8 || array.shape(2) != 3))
     fail(name, "must be " + expected + ", not of shape " + shape_text(array));
   const size_t n = array.shape(0);
   std::vector<double> sizes, centres, orientations;
@@ -185,7 +188,8 @@ nb::tuple fit_boxes(nb::handle given, const std::string& name) {
 
 /// Rows with rows, or all rows of one array with all rows of the other.
 Pairing to_pairing(const ShapeArray& a, const ShapeArray& b, bool aligned) {
-  if (a.planar != b.planar) fail("b", std::string("must be rectangles if a is, and only then"));
+  const bool both = a.size() && b.size();
+  if (both && a.planar != b.planar) fail("b", std::string("must be rectangles if a is, and only then"));
   if (aligned && a.size() != b.size())
     fail("b", "must have as many rows as a, " + std::to_string(a.size()) + ", not " + std::to_string(b.size()));
   return aligned ? Pairing::kRows : Pairing::kAll;

@@ -195,6 +195,22 @@ def test_empty_arrays_have_empty_answers():
         assert of(none, none, aligned=True).shape == (0,)
         assert of(np.empty((0, 5)), np.empty((0, 5))).shape == (0, 0)
         assert of(np.empty((0, 8, 3)), one).shape == (0, 1)
+        assert of([], one).shape == (0, 1) and of(one, []).shape == (1, 0)
+        assert of(np.empty((0, 5)), one).shape == of([], [[0, 0, 1, 1, 0]]).shape == (0, 1)
+
+
+def test_an_empty_list_makes_no_shapes():
+    made = [arrays.boxes([]), arrays.boxes([], [], []), arrays.boxes_of_corners([]), arrays.rectangles([])]
+    made += [arrays.spheres([]), arrays.capsules([], []), arrays.cylinders([], []), arrays.ellipsoids([], [])]
+    assert [len(each) for each in made] == [0] * len(made)
+    assert arrays.corners([]).shape == (0, 8, 3)
+    none, some = arrays.volume_gradient([], [[0, 0, 1, 1, 0], [1, 0, 1, 1, 0]])
+    assert len(none.sizes) == len(none.positions) == len(none.rotations) == 0
+    assert [each.tolist() for each in some] == [[[0, 0]] * 2, [[0, 0]] * 2, [[0]] * 2]
+    with pytest.raises(ValueError, match=r"^positions must have a row for each of the 3 boxes, not 0$"):
+        arrays.boxes(THREE, [])
+    with pytest.raises(ValueError, match=r"^a must be shapes"):
+        arrays.iou([[]], arrays.boxes(THREE))
 
 
 def test_rows_of_an_array_are_placed_shapes():
@@ -249,6 +265,8 @@ def changed(value, row=1, column=0, of=THREE):
         (lambda: arrays.iou("boxes", THREE), r"^a must be shapes of overlapper\.arrays, corners"),
         (lambda: arrays.iou(arrays.boxes(THREE), np.ones((1, 5))), r"^b must be rectangles if a is, and only then$"),
         (lambda: arrays.volume(arrays.boxes(THREE), arrays.spheres([1]), aligned=True), r"^b must have as many rows"),
+        (lambda: arrays.volume_gradient(arrays.boxes(THREE), arrays.boxes(THREE), THREE * np.nan), r"^weights must be"),
+        (lambda: arrays.volume_gradient([[0, 0, 1, 1, 0]], [[2, 0, 1, 1, 0]], [[np.inf]]), r"^weights must be finite$"),
         (lambda: arrays.giou(arrays.boxes(THREE), arrays.spheres([1])), r"^b must be boxes or rectangles$"),
         (lambda: arrays.volume(arrays.boxes(THREE), arrays.boxes(THREE), threads=0), r"^threads must be 1 or more"),
         (lambda: arrays.volume(arrays.boxes(THREE), arrays.boxes(THREE), tolerance=0), r"^tolerance must be greater"),
