@@ -30,6 +30,9 @@ std::vector<double> to_pose_rows(const Doubles& array, const char* name, size_t 
 PoseRows to_poses(nb::handle positions, nb::handle orientations, size_t k) {
   const Doubles given = to_doubles(positions, "positions", "an array of shape (k, 3) or (k, 4, 4), one row per shape");
   const bool matrices = given.ndim() == 3;
+  if (matrices && (given.shape(0) != k || given.shape(1) != 4 || given.shape(2) != 4))
+    fail("positions",
+         "must be an array of shape (k, 3) or (k, 4, 4), one row per shape, not of shape " + shape_text(given));
   if (matrices != orientations.is_none())
     fail("orientations", matrices ? "must be left out if the positions are matrices"
                                   : "must be given, unless the positions are matrices of shape (k, 4, 4)");
@@ -37,8 +40,6 @@ PoseRows to_poses(nb::handle positions, nb::handle orientations, size_t k) {
     return {to_pose_rows(given, "positions", k, 3),
             to_pose_rows(to_doubles(orientations, "orientations", "an array of shape (k, 4), one row per shape"),
                          "orientations", k, 4)};
-  if (given.shape(0) != k || given.shape(1) != 4 || given.shape(2) != 4)
-    fail("positions", "must be an array of shape (k, 4, 4), one matrix per shape, not of shape " + shape_text(given));
   PoseRows rows;
   for (size_t i = 0; i < k; ++i) {
     const std::span<const double, 16> matrix(given.data() + 16 * i, 16);

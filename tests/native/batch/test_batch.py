@@ -364,11 +364,15 @@ POSES = ([[0, 0, 0], [1, 0, 0]], [[0, 0, 0, 1]] * 2)
         ({"positions": "there"}, "positions must be an array of shape (k, 3) or (k, 4, 4), one row per shape"),
         (
             {"positions": [np.eye(4)], "orientations": None},
-            "positions must be an array of shape (k, 4, 4), one matrix per shape, not of shape (1, 4, 4)",
+            "positions must be an array of shape (k, 3) or (k, 4, 4), one row per shape, not of shape (1, 4, 4)",
         ),
         (
             {"positions": [np.eye(4), np.diag([1, 1, -1, 1])], "orientations": None},
             "positions[1] must not reflect: the determinant of its rotation is -1",
+        ),
+        (
+            {"positions": np.zeros((1, 2, 3))},
+            "positions must be an array of shape (k, 3) or (k, 4, 4), one row per shape, not of shape (1, 2, 3)",
         ),
         ({"positions": [np.eye(4)] * 2}, "orientations must be left out if the positions are matrices"),
         (
