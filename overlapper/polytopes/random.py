@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper._core import Hull
+from overlapper.whole_number import whole
 
 __all__ = ["Source", "random_polytope"]
 
@@ -35,6 +36,8 @@ def random_polytope(n: int, source: Source = "cube", *, rng: np.random.Generator
 
     Raises
     ------
+    TypeError
+        If `n` is not a whole number.
     ValueError
         If `n` is below 4, or `source` is unknown.
 
@@ -46,6 +49,7 @@ def random_polytope(n: int, source: Source = "cube", *, rng: np.random.Generator
     """
     if source not in get_args(Source):
         raise ValueError(f"source must be one of {', '.join(get_args(Source))}, not {source!r}")
+    n = whole(n, "n")
     if n < 4:
         raise ValueError(f"n must be at least 4, because fewer points or planes enclose no volume, not {n}")
     generator = np.random.default_rng(rng)

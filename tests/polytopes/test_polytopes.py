@@ -62,6 +62,8 @@ def test_few_planes_enclose_a_cell_of_bounded_reach(seed):
 def test_polytopes_that_cannot_be_drawn_at_random_are_refused():
     with pytest.raises(ValueError, match=r"n must be at least 4, .* not 3"):
         random_polytope(3)
+    with pytest.raises(TypeError, match="n must be a whole number, not '8'"):
+        random_polytope("8")
     with pytest.raises(ValueError, match="source must be one of cube, ball, sphere, halfspaces, not 'torus'"):
         random_polytope(10, "torus")
 
