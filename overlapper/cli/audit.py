@@ -24,6 +24,7 @@ from overlapper.cli.options import (
     ToleranceOption,
     expected_pairs,
     modelling,
+    options_given,
     refuse_table,
     refuse_tolerance,
     with_options,
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
 
 LISTED = 20  # pairs at most
 LIMIT = 20_000  # boxes for each pair of links
+HOW_SHAPES_ARE_READ = {"--concave", "--concave-threshold", "--surface"}
+OF_FOLDERS = {"--least-depth", "--out", "--units", "--json", *HOW_SHAPES_ARE_READ}
+OF_VERIFY = {"--verify", "--json", *HOW_SHAPES_ARE_READ}
 CAPTION = (
     "Fraction: share of the random configurations, with its 95 % confidence bounds. Volume: the largest. Depth: the "
     "largest, of the deepest pair of shapes."
@@ -90,6 +94,7 @@ def audit(
         Literal["mm", "cm", "m", "in"], typer.Option(help="Unit of length of meshes whose files state none.")
     ] = "m",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
+    context: typer.Context = None,  # type: ignore[assignment]  # typer gives it
 ) -> None:
     """Report which pairs of links of a robot overlap never, sometimes or always: how often, how much and how deep.
 
@@ -135,19 +140,16 @@ def audit(
         **settings_of(modelled),
     }
     settings |= {"limit": boxes} if prove else {}
+    given = options_given(context)
     if robot.is_dir():
-        asked: dict[str, Any] = {
-            "--expect": expect,
-            "--against": against,
-            "--srdf": srdf,
-            "--exclude": exclude,
-            "--html": html,
-        }
-        asked |= {"--prove": prove, "--cover": cover, "--verify": verify}
-        if of_robots := [name for name, value in asked.items() if value]:
+        if of_robots := [each for each in given if each not in OF_FOLDERS]:
             raise Refused(f"{of_robots[0]} needs a robot, but {robot} is a folder")
         audit_folder(robot, units, least_depth, modelled, out, as_json)
+    if "--units" in given:
+        raise Refused(f"--units needs a folder, but {robot} is a robot")
     if verify:
+        if ignored := [each for each in given if each not in OF_VERIFY]:
+            raise Refused(f"{ignored[0]} has no effect with --verify, which only checks proofs")
         _verify(robot, verify, modelled, as_json)
     written: list[Path] = []
     with input_refusals(), quiet():

@@ -189,6 +189,15 @@ def files(
     return Written(out, html, per, check)
 
 
+def options_given(context: typer.Context | None) -> list[str]:
+    """The options on the command line. None of them if the command is called as a function."""
+    if context is None:
+        return []
+    options = {each.name: each.opts[0] for each in context.command.params if each.param_type_name == "option"}
+    sources = {option: context.get_parameter_source(name) for name, option in options.items() if name}
+    return [option for option, source in sources.items() if source and source.name == "COMMANDLINE"]
+
+
 def with_options(**groups: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """For commands: a parameter of each of these names has the options that the function takes, and is its answer."""
 

@@ -33,7 +33,8 @@ def robot(tmp_path, monkeypatch):
 
 
 def run(*arguments):
-    done = overlapper("audit", "--configurations", COUNT, *arguments)
+    sampled = not {"--verify", "."} & {*arguments}
+    done = overlapper("audit", *(["--configurations", COUNT] if sampled else []), *arguments)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -275,6 +276,10 @@ def test_an_overlap_that_only_the_proof_found_is_said(tmp_path):
         (["table.urdf", "--limit", "5"], "--limit needs --prove"),
         (["table.urdf", "--prove", "--cover", "proofs.json"], "--cover must end in .npz, not 'proofs.json'"),
         ([".", "--prove"], "--prove needs a robot, but . is a folder"),
+        ([".", "--seed", "3"], "--seed needs a robot, but . is a folder"),
+        (["table.urdf", "--units", "mm"], "--units needs a folder, but table.urdf is a robot"),
+        (["table.urdf", "--verify", "none.npz", "--seed", "0"], "--seed has no effect with --verify, which"),
+        (["table.urdf", "--verify", "none.npz", "--workers", "1"], "--workers has no effect with --verify, which"),
         (["table.urdf", "--verify", "table.urdf"], "table.urdf is not a file of covers"),
         (["table.urdf", "--verify", "none.npz"], "none.npz: No such file or directory"),
         (["none.urdf", "--verify", "none.npz"], "there is no file none.urdf"),

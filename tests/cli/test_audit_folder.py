@@ -133,8 +133,9 @@ def test_an_error_in_one_asset_does_not_stop_the_others(folder, monkeypatch):
 
 
 def test_options_for_robots_and_an_empty_folder_are_refused(folder, tmp_path):
-    with pytest.raises(Refused, match=r"^--srdf needs a robot, but .*assets is a folder$"):
-        command(folder, srdf=tmp_path / "out.srdf")
+    given = [sys.executable, "-m", "overlapper", "audit", folder, "--srdf", tmp_path / "out.srdf"]
+    done = subprocess.run(given, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (2, f"overlapper: --srdf needs a robot, but {folder} is a folder\n")
     (tmp_path / "empty").mkdir()
     with pytest.raises(Refused, match=r"^the folder .*empty has no model and no mesh with one of the endings \.urdf, "):
         command(tmp_path / "empty")
