@@ -22,9 +22,7 @@ from overlapper.cli.view import view
 from overlapper.cli.watch import watch
 from overlapper.scenes.scene import headline, scene_paths
 
-app = typer.Typer(
-    add_completion=False, pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]}
-)
+app = typer.Typer(pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]})
 
 
 def main() -> NoReturn:

@@ -12,11 +12,19 @@ from typing import Annotated, Any, Literal
 import typer
 
 from overlapper.cli.refusals import Refused
-from overlapper.scenes.scene import ContactModel
+from overlapper.scenes.scene import ContactModel, scene_paths
 from overlapper.simulation.settings import Asking, Modelling
 
+
+def _scene_names(begun: str) -> list[str]:
+    return [name for name in scene_paths() if name.startswith(begun)]
+
+
 SceneArgument = Annotated[
-    str, typer.Argument(help="Name of a scene, or path of a scene file (.py).", show_default=False)
+    str,
+    typer.Argument(
+        help="Name of a scene, or path of a scene file (.py).", show_default=False, autocompletion=_scene_names
+    ),
 ]
 
 OutOption = Annotated[

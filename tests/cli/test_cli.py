@@ -113,6 +113,26 @@ def test_help_is_broken_at_the_margin_only_and_has_a_short_name():
     assert "which fills a pybullet client. build(client) may return a function step(i)" in text
 
 
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("overlapper au", ["audit"]),
+        ("overlapper run --hel", ["--help"]),
+        ("overlapper run franka_g", ["franka_grasp"]),
+        ("overlapper run r2d2_fall --contact vol", ["volumetric"]),
+    ],
+)
+def test_a_shell_is_offered_commands_options_scenes_and_choices(line, offered):
+    words = {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split()) - 1), "_OVERLAPPER_COMPLETE": "complete_bash"}
+    assert overlapper(**words).stdout.split() == offered
+
+
+def test_completion_of_a_shell_is_installed_by_an_option(tmp_path):
+    assert overlapper("--install-completion", "bash", HOME=str(tmp_path)).returncode == 0
+    assert ".bash_completions/overlapper.sh" in (tmp_path / ".bashrc").read_text()
+    assert "_OVERLAPPER_COMPLETE=complete_bash" in (tmp_path / ".bash_completions/overlapper.sh").read_text()
+
+
 def test_scenes_are_listed_with_what_happens_in_them():
     assert re.search(r"^box_pile +Two hundred boxes", overlapper("scenes").stdout, re.MULTILINE)
 
