@@ -1,4 +1,4 @@
-"""A Franka arm lifts a rubber duck by friction alone, pushed apart by the volumes that they share, and holds it.
+"""With volumetric contact, a Franka arm lifts a rubber duck by friction alone and holds it.
 
 Hard: nothing creeps only if the friction of two fingers sticks to the last digit while seven motors, a gear between the
 fingers and gravity pull at what they hold. The duck is five hulls that overlap each other, and the fingers are wedges.
