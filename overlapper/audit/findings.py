@@ -73,5 +73,6 @@ def remarks(robot: Robot) -> list[str]:
 
 
 def _how_often(audited: PairAudit) -> str:
-    assert audited.largest
-    return f"in {audited.met:,} of {audited.asked:,} configurations, first in number {audited.largest.number:,}"
+    assert audited.deepest
+    depth = 1e3 * audited.deepest.contact.depth
+    return f"in {audited.met:,} of {audited.asked:,} configurations, by up to {depth:.3g} mm"
