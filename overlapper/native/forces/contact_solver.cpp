@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "forces/pressure.h"
 
@@ -35,6 +37,7 @@ struct ContactSolver::Laws {
   PatchFriction friction;
   Six wrench;
   Drift drift;
+  double relative_damping = 0;  ///< N, see find_relative_damping()
 };
 
 ContactSolver::Row::Row(const ElasticPatch& patch)
@@ -82,6 +85,7 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
     of_body[a] += swing;
     if (a != b) of_body[b] += swing;
   }
+  share_damping();
   std::vector<double> frequency2;
   frequency2.reserve(patches_.size());
   for (const ElasticPatch& patch : patches_) {
@@ -91,6 +95,58 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
     frequency2.push_back(highest);
   }
   return frequency2;
+}
+
+/// Finds the damping along the normals. The patches of two links are damped as one patch, as far as they have the same
+/// normal: a body that consists of parts moves like a whole body. The damping follows the mean of their slips, weighted
+/// by their forces. This is the slip at the centroid of the whole volume.
+void ContactSolver::share_damping() {
+  std::map<std::pair<int, int>, std::vector<int>> of_links;
+  for (int i = 0; i < int(rows_.size()); ++i)
+    if (patches_[i].damping > 0 && rows_[i].area.area > 0)
+      of_links[{patches_[i].link_a, patches_[i].link_b}].push_back(i);
+  for (const auto& [links, group] : of_links) {
+    for (int i : group) {
+      double stiffness = 0, force = 0;
+      Vec3 centroid;
+      std::vector<Share> shares;
+      for (int j : group) {
+        const ElasticPatch& other = patches_[j];
+        const double same = j == i ? 1 : std::max(0.0, overlapper::dot(patches_[i].normal, other.normal));
+        stiffness += same * other.stiffness * rows_[j].area.area;
+        force += same * other.force, centroid += same * other.force * (other.centroid - patches_[i].centroid);
+        if (j != i && same > 0) shares.push_back({j, same * other.force});
+      }
+      double mobility = rows_[i].normal_by_normal[0][0];
+      if (!shares.empty()) {
+        ElasticPatch whole = patches_[i];
+        whole.centroid += centroid / force;
+        Row row(whole);
+        add_sides(row, whole);
+        mobility = row.normal_by_normal[0][0];
+      }
+      // The bodies' mass along the normal is the inverse of their mobility.
+      if (!(mobility > 0)) continue;
+      rows_[i].damping = 2 * patches_[i].damping * std::sqrt(stiffness / mobility) * (patches_[i].force / force);
+      for (Share& share : shares) share.part *= rows_[i].damping / force;
+      rows_[i].damped_with = std::move(shares);
+    }
+  }
+}
+
+/// The damping by the motion of other patches relative to each patch, in N. It is 0 for patches that are damped alone.
+void ContactSolver::find_relative_damping(std::span<const double> velocity, std::span<Laws> laws) const {
+  std::vector<double> slip;
+  for (size_t i = 0; i < rows_.size(); ++i) {
+    if (rows_[i].damped_with.empty()) continue;
+    if (slip.empty()) {
+      slip.resize(rows_.size());
+      for (size_t j = 0; j < rows_.size(); ++j)
+        if (!rows_[j].damped_with.empty()) slip[j] = slip_of(rows_[j], velocity).normal[0];
+    }
+    laws[i].relative_damping = 0;
+    for (const auto [other, part] : rows_[i].damped_with) laws[i].relative_damping += part * (slip[other] - slip[i]);
+  }
 }
 
 void ContactSolver::add_sides(Row& row, const ElasticPatch& patch) {
@@ -257,7 +313,7 @@ double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span
   const Row& row = rows_[patch];
   const Six slip = slip_of(row, velocity), last = laws.wrench;
   const Three without = slip.normal - duration * (row.normal_by_normal * last.normal);
-  laws.wrench.normal = laws.pressure.answer(without);
+  laws.wrench.normal = laws.pressure.answer(without, laws.relative_damping);
   const Three pressed = laws.wrench.normal - last.normal;
   const Three tangential = slip.tangential + laws.drift.slip + duration * (row.tangential_by_normal * pressed);
   laws.wrench.tangential = laws.friction.answer(tangential, last.tangential, laws.wrench.normal[0]);
@@ -313,7 +369,7 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
     const Six before = slip_of(row, step.velocity), free = slip_of(row, velocity);
     largest = std::max({largest, std::abs(free.normal[0]), std::abs(free.tangential[0]), std::abs(free.tangential[1])});
     const Rule rule = step.damped[i] ? Rule::kDamping : Rule::kKeeping;
-    laws.push_back({{patch, row.area, row.normal_by_normal, before.normal, h, rule},
+    laws.push_back({{patch, row.area, row.normal_by_normal, row.damping, before.normal, h, rule},
                     {patch.friction, row.area, h * row.tangential_by_tangential, step.friction},
                     known_wrench(i),
                     drift(i, step, ahead)});
@@ -326,6 +382,7 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   for (const int most = std::clamp(kVisits / std::max(1, count), kFewest, kMost); sweeps < most && count > 0;) {
     // Sweeps go there and back, so that a push at one end of a stack soon reaches the other end.
     changed = 0;
+    find_relative_damping(velocity, laws);
     for (int k = 0; k < count; ++k) {
       const int i = sweeps % 2 ? count - 1 - k : k;
       changed = std::max(changed, visit(i, laws[i], h, velocity));

@@ -76,6 +76,12 @@ class ContactSolver {
     size_t answers;  ///< in `pool_`: so many rows of 6; unused if the body does not move
   };
 
+  /// The part of a patch's damping that follows the slip of another patch, in N s/m.
+  struct Share {
+    int other;
+    double part;
+  };
+
   struct Row {
     Row(const ElasticPatch& patch);
 
@@ -86,6 +92,8 @@ class ContactSolver {
     PlaneArea area;
     std::array<Side, 2> sides{};
     int sides_used = 0;
+    double damping = 0;              ///< N s/m, along the normal
+    std::vector<Share> damped_with;  ///< the other patches of the same two links
     /// The change of the slip by a wrench in 1 s: of the normal part by the normal part, and so on.
     ThreeByThree normal_by_normal{}, normal_by_tangential{}, tangential_by_normal{}, tangential_by_tangential{};
   };
@@ -113,6 +121,8 @@ class ContactSolver {
   };
 
   void add_sides(Row& row, const ElasticPatch& patch);
+  void share_damping();
+  void find_relative_damping(std::span<const double> velocity, std::span<Laws> laws) const;
   void add_single(Row& row, int link, double sign, Vec3 centroid);
   void add_side(Row& row, int body, std::span<const double> jacobian);
   Screw answer(const Side& side, const Screw& wrench) const;

@@ -33,14 +33,13 @@ ThreeByThree PlaneArea::foundation(double stiffness) const {
            {-k * u, -k * (uv + u * v), k * (uu + u * u)}}};
 }
 
-Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, const Three& before,
-                   double duration, Rule rule)
+Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, double damping,
+                   const Three& before, double duration, Rule rule)
     : area_(area), mobility_(mobility), duration_(duration) {
   const ThreeByThree foundation = area.foundation(patch.stiffness);
   const double lead = ahead(rule) * duration;
   response_ = (lead + patch.dissipation) * foundation;
-  // The bodies' mass along the normal is the inverse of their mobility. Tipping and rolling are not damped.
-  if (mobility[0][0] > 0) response_[0][0] += 2 * patch.damping * std::sqrt(foundation[0][0] / mobility[0][0]);
+  response_[0][0] += damping;  // tipping and rolling are not damped
   // Backward Euler depends on the velocity at the end only. The other rule depends on the change of the velocity.
   const Three known = (rule == Rule::kKeeping ? lead : 0) * (foundation * before);
   rest_ = Three{patch.force, 0, 0} + known;
@@ -53,8 +52,8 @@ Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const Three
   in_radii_ = {vv / square, -uv / square, uu / square};
 }
 
-Three Pressure::answer(const Three& slip) const {
-  const Three target = rest_ - response_ * slip;
+Three Pressure::answer(const Three& slip, double more) const {
+  const Three target = rest_ - response_ * slip - Three{more, 0, 0};
   const Three asked = implicit_ * target;
   const double force = asked[0];
   if (!(area_.area > 0)) return {std::max(0.0, force), 0, 0};

@@ -14,12 +14,14 @@ enum class Rule { kKeeping, kDamping };
 class Pressure {
  public:
   /// `before` is the slip at the beginning of the step. `mobility` times pressures is the change of the slip in 1 s.
-  Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, const Three& before,
-           double duration, Rule rule);
+  /// `damping` in N s/m resists motion along the normal, besides the dissipation.
+  Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, double damping,
+           const Three& before, double duration, Rule rule);
 
   /// The pressures. `slip` is the slip at the end of the step without them. Pressures push, and their centre stays on
   /// the area.
-  Three answer(const Three& slip) const;
+  /// `more` in N is damping that does not follow from this slip.
+  Three answer(const Three& slip, double more) const;
 
  private:
   PlaneArea area_;
