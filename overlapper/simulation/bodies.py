@@ -310,6 +310,14 @@ class AnyBodies:
         return [*skipped, *self._source.skipped, *(self._lost(id) for id in sorted(self._nowhere))]
 
     @property
+    def tops(self) -> Array | None:
+        """(k, 3) normals of the only faces that others can press, in the frames of the shapes; 0 without such a face.
+
+        Prisms of height fields have such a face, except at the border. None if no shape has one.
+        """
+        return self._layout.tops
+
+    @property
     def rules(self) -> Rules:
         """Which links the simulator lets collide. The object is replaced when the rules may have changed."""
         return self._rules

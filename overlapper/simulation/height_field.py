@@ -53,10 +53,34 @@ class HeightField:
 
     def prism(self, number: int) -> Hull:
         """The ground below a triangle, down to the base."""
+        return Hull([(x, y, height) for x, y, z in self._triangle(number) for height in (z, self.base)])
+
+    def top(self, number: int) -> tuple[float, float, float]:
+        """The upward unit normal of a triangle. It is 0 at the border, where a wall of the prism is free, too."""
         columns, rows = self.heights.shape
-        j, i = divmod(number // 2, rows - 1)
+        corners = self._corners(number)
+        for at, last in zip(zip(*corners), (rows - 1, columns - 1)):
+            if at.count(0) == 2 or at.count(last) == 2:
+                return 0.0, 0.0, 0.0
+        first, second, third = np.array(self._triangle(number))
+        normal = np.cross(second - first, third - first)
+        x, y, z = (normal / np.copysign(np.linalg.norm(normal), normal[2])).tolist()
+        return x, y, z
+
+    def _corners(self, number: int) -> list[tuple[int, int]]:
+        """The columns and rows of the corners of a triangle."""
+        j, i = divmod(number // 2, self.heights.shape[1] - 1)
         cut = [(i, j), (i + 1, j + 1)] if self.rising else [(i + 1, j), (i, j + 1)]
-        corners = [*cut, (i + (number % 2 != self.rising), j + number % 2)]
-        flat = [((u - (rows - 1) / 2) * self.spacing[0], (v - (columns - 1) / 2) * self.spacing[1]) for u, v in corners]
-        tops = [self.heights[v, u] for u, v in corners]
-        return Hull([(*at, z) for at, top in zip(flat, tops) for z in (top, self.base)])
+        return [*cut, (i + (number % 2 != self.rising), j + number % 2)]
+
+    def _triangle(self, number: int) -> list[tuple[float, float, float]]:
+        """The corners of a triangle, m."""
+        columns, rows = self.heights.shape
+        return [
+            (
+                (u - (rows - 1) / 2) * self.spacing[0],
+                (v - (columns - 1) / 2) * self.spacing[1],
+                float(self.heights[v, u]),
+            )
+            for u, v in self._corners(number)
+        ]

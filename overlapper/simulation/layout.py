@@ -38,7 +38,8 @@ class Layout:
     `key_rows` (k, 3) are the keys as an array. `shapes` and `batch` are the shapes, and `owners` (k,) are their bodies.
     `colliders` (k,) are the rows of their links in `collider_rows`, which is by (body, link). `of_several_colliders`
     are the bodies with shapes on links other than the base. `positions` (k, 3) and `orientations` (k, 4) are the poses
-    of the shapes at the last `pose`.
+    of the shapes at the last `pose`. `tops` (k, 3) are those of `ModelledShape`, or None if all faces of all shapes are
+    free.
     """
 
     def __init__(
@@ -53,6 +54,8 @@ class Layout:
         self.batch = Batch(self.shapes)
         self._local_positions = np.array([each.position for each in modelled]).reshape(-1, 3)
         self._local_orientations = np.array([each.orientation for each in modelled]).reshape(-1, 4)
+        tops = np.array([each.top for each in modelled]).reshape(-1, 3)
+        self.tops: Array | None = tops if tops.any() else None
         self.positions: Array = np.full_like(self._local_positions, np.nan)
         self.orientations: Array = np.full_like(self._local_orientations, np.nan)
         links = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -104,13 +104,18 @@ class Leaf:
 
 @dataclass(frozen=True, slots=True)
 class ModelledShape:
-    """A modelled shape, placed in the frame of its collider: the inertial frame of the base or link."""
+    """A modelled shape, placed in the frame of its collider: the inertial frame of the base or link.
+
+    `top` (3,) is the unit normal of the only face that others can press, in the frame of the shape, and 0 if all faces
+    are free.
+    """
 
     link: int
     index: int
     shape: Shape
     position: Array
     orientation: Array
+    top: Sequence[float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +128,8 @@ class Ground:
     orientation: Array
 
     def prism(self, number: int) -> ModelledShape:
-        return ModelledShape(self.link, number, self.field.prism(number), self.position, self.orientation)
+        shape, top = self.field.prism(number), self.field.top(number)
+        return ModelledShape(self.link, number, shape, self.position, self.orientation, top)
 
 
 @dataclass(frozen=True, slots=True)

@@ -233,6 +233,60 @@ def test_a_cube_rests_on_a_flat_field_by_its_overlap():
     assert 0.05 - data.qpos[2] == pytest.approx(9.81 / (1e7 * 0.01), rel=1e-2) and abs(data.qvel[:3]).max() < 1e-6
 
 
+def moved(body, heights, steps, speed=0.0, tilt="", **law):
+    """The pose of a body after steps on a field, whose cells are 0.1 m wide."""
+    model, data = hills(body, where=tilt, heights=heights, size=".8 .8 .8 .8")
+    data.qvel[0] = speed
+    with VolumetricContact(Bodies(model, data), friction=0.5, **law) as contact:
+        for _ in range(steps):
+            contact.step()
+        return data.qpos.copy(), contact.mean()
+
+
+def test_prisms_press_with_their_tops_alone():
+    """The walls between prisms are inside the field. A ball on them, dropped beside a vertex, does not roll away."""
+    flat = np.zeros((17, 17))
+    fallen, forces = moved(free('size=".05" mass="1"', ".013 .021 .07"), flat, 400)
+    assert len(forces) > 1 and np.abs(fallen[:2] - (0.013, 0.021)).max() < 1e-7
+    assert np.allclose(np.abs(forces.normal), (0, 0, 1)) and np.linalg.norm(fallen[4:6]) < 1e-6
+    cap = 9.81 / 1e7  # m³: the volume of the ball below the ground
+    depth = 0.05 - fallen[2]
+    assert math.pi * depth**2 * (0.05 - depth / 3) == pytest.approx(cap, rel=1e-6)
+
+
+def test_a_cube_slides_on_prisms_as_far_as_on_a_plane():
+    cube = free('type="box" size=".05 .05 .05" mass="1"', ".013 .021 .0499")
+    slid, _ = moved(cube, np.zeros((17, 17)), 400, speed=1.0)
+    assert slid[0] - 0.013 == pytest.approx(1 / (2 * 0.5 * 9.81), rel=0.02)
+    assert abs(slid[1] - 0.021) < 5e-5
+    assert math.degrees(2 * math.acos(min(1, abs(slid[3])))) < 0.2
+
+
+def test_a_cube_on_a_slope_of_prisms_rests_at_the_depth_of_its_weight():
+    """The walls are not perpendicular to this top, and still nothing presses against them."""
+    slope = 0.3  # rise per run: 0.48 m over the field
+    heights = np.tile(np.linspace(0, slope * 1.6 / 0.8, 17), (17, 1))
+    angle = math.atan(slope)
+    up = np.array([-math.sin(angle), 0, math.cos(angle)])
+    middle = np.array([0.013, 0.021, 0.8 * heights[0, 8] + slope * 0.013]) + (0.05 - 1e-4) * up
+    turn = f'quat="{math.cos(angle / 2)} 0 {-math.sin(angle / 2)} 0"'
+    at = " ".join(map(repr, middle.tolist()))
+    cube = f'<body pos="{at}" {turn}><freejoint/><geom type="box" size=".05 .05 .05" mass="1"/></body>'
+    rests, forces = moved(cube, heights, 400)
+    assert np.allclose(np.abs(forces.normal @ up), 1)
+    assert forces.on(1)[0] == pytest.approx([0, 0, 9.81], abs=1e-4)
+    depth = 0.05 - (rests[:3] - (0, 0, 0.8 * heights[0, 8])) @ up
+    assert depth == pytest.approx(9.81 * math.cos(angle) / (1e7 * 0.01), rel=0.01)
+    assert np.linalg.norm(rests[:3] - middle) < 2e-4
+
+
+def test_walls_at_the_border_of_a_field_are_free():
+    field = Bodies(*hills(free('size=".1"', "-.6 0 .05"), heights=np.zeros((5, 7))))
+    tops = {key[2]: top for key, top in zip(field.keys, field.tops) if key[1] == 0}
+    assert {number for number, top in tops.items() if not top.any()} == {n for n in tops if n % 2 and (n % 12 == 1 or n > 36)}
+    assert all(top.tolist() in ([0, 0, 0], [0, 0, 1]) for top in tops.values())
+
+
 def test_parts_of_a_field_are_not_compared_with_mujocos_whole_field():
     model, data = hills(free('size=".1"', "0 0 .1"), rest='<geom size=".05" pos="0 0 .1"/>')
     bodies = Bodies(model, data)

@@ -139,28 +139,29 @@ const Overlaps::Patches& Overlaps::patches() const {
     found.centre.reserve(size());
     found.moments.reserve(size());
     found.distance.reserve(size());
-    // Equals Overlap::patch(), without an Overlap where the way is the same.
-    const auto patch_of_row = [&](size_t row) {
-      if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) return PatchSums({}, {}).patch();
-      const Way by = static_cast<Way>(way[row]);
-      std::optional<Patch> patch;
-      if (by == Way::kClipping || by == Way::kWideClipping)
-        patch = clipped_patch(placed(pairs[row][0]), placed(pairs[row][1]));
-      if (by == Way::kClosedForm) {
-        const std::array<double, 6>& pull = gradient[row][1];
-        patch = closed_forms::section_patch(placed(pairs[row][0]), placed(pairs[row][1]), centroid[row],
-                                            {pull[0], pull[1], pull[2]});
-      }
-      return patch ? *patch : overlap(row)->patch();
-    };
     for (size_t row = 0; row < size(); ++row) {
-      const Patch patch = patch_of_row(row);
-      found.centre.push_back(patch.centre);
-      found.moments.push_back(patch.moments);
-      found.distance.push_back(patch.distance);
+      const Patch of_row = patch(row);
+      found.centre.push_back(of_row.centre);
+      found.moments.push_back(of_row.moments);
+      found.distance.push_back(of_row.distance);
     }
     return found;
   });
+}
+
+/// Equals Overlap::patch(), without an Overlap where the way is the same.
+Patch Overlaps::patch(size_t row, const std::optional<Vec3>& direction) const {
+  if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) return PatchSums({}, {}).patch();
+  const auto [a, b] = pairs[row];
+  const Way by = static_cast<Way>(way[row]);
+  std::optional<Patch> exact;
+  if (by == Way::kClipping || by == Way::kWideClipping) exact = clipped_patch(placed(a), placed(b), direction);
+  if (by == Way::kClosedForm && !direction) {
+    const std::array<double, 6>& pull = gradient[row][1];
+    exact = closed_forms::section_patch(placed(a), placed(b), centroid[row], {pull[0], pull[1], pull[2]});
+  }
+  if (exact) return *exact;
+  return direction ? overlap(row)->patch_along(*direction) : overlap(row)->patch();
 }
 
 Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {

@@ -66,6 +66,8 @@ struct Overlaps {
   Overlaps select(std::span<const std::int64_t> rows) const;
   /// Computed on first use, pair by pair.
   const Patches& patches() const;
+  /// The patch of a row. It is seen along a unit direction if one is given.
+  Patch patch(size_t row, const std::optional<Vec3>& direction = {}) const;
 
  private:
   Placed placed(int body) const;

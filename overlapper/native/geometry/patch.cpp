@@ -94,4 +94,23 @@ Patch PatchSums::patch() const {
   return result;
 }
 
+Patch lifted(const Patch& seen, Vec3 centroid, Vec3 normal) {
+  const Vec3 along = unit(seen.area);
+  const double cosine = dot(along, normal);
+  if (cosine > 1 - 0x1p-50) return seen;
+  const auto lift = [&](Vec3 x) { return x - (dot(x, normal) / cosine) * along; };
+  const double area = norm(seen.area) / cosine;
+  PatchSums sums(centroid, area * normal);
+  // The columns of the moments are lifted, then the rows.
+  const auto second = [&](Vec3 p, Vec3 q) {
+    const auto down = [&](Vec3 x) { return x - (dot(x, along) / cosine) * normal; };
+    return dot(down(p), seen.moments * down(q)) / cosine;
+  };
+  const Vec3 from = lift(seen.centre - centroid);
+  const double u = dot(from, sums.u()), v = dot(from, sums.v());
+  sums.add(area, area * u, area * v, second(sums.u(), sums.u()) + area * u * u,
+           second(sums.u(), sums.v()) + area * u * v, second(sums.v(), sums.v()) + area * v * v);
+  return sums.patch();
+}
+
 }  // namespace overlapper

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "geometry/vec.h"
 
 namespace overlapper {
@@ -18,6 +20,15 @@ inline Patch turned(const Patch& patch, const Mat3& rotation, Vec3 translation) 
   return {rotation * patch.area, rotation * patch.centre + translation, rotation * patch.moments * transposed(rotation),
           patch.distance};
 }
+
+/// The area vector of a patch that is seen along a unit direction instead of its own area vector.
+inline Vec3 seen_along(Vec3 area, const std::optional<Vec3>& direction) {
+  return direction ? dot(area, *direction) * *direction : area;
+}
+
+/// The patch that lies in a plane with this unit normal, from the same patch seen along another direction. Its centre
+/// is in the plane through the centroid.
+Patch lifted(const Patch& seen, Vec3 centroid, Vec3 normal);
 
 /// ∫ |x| dA over the triangle from the origin to the edge from (a, b) to (c, d). Negative if the edge goes clockwise.
 double distance_over_edge(double a, double b, double c, double d);

@@ -467,11 +467,11 @@ std::optional<Spread> spread(const OverlappingBodies& overlapping, const Measure
   return spread_between(*large, *small, sliced.area_error);
 }
 
-std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, const Measures& measures) {
+std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, Vec3 centroid, Vec3 area) {
   const Arrangement& at = overlapping.at;
   const WideVector inside = point_inside(overlapping);
   const bool swapped = at.order[0] == 1;
-  PatchSums sums(measures.centroid - at.reference - rounded(inside), measures.pulls[1].force);
+  PatchSums sums(centroid - at.reference - rounded(inside), area);
   if (!measure_by_slices({at.relative[0], at.relative[1], at.reference, inside, 0, false, swapped ? 0 : 1, &sums}))
     return std::nullopt;
   Patch patch = sums.patch();

@@ -161,8 +161,8 @@ struct Spread {
 /// No value if slicing gives up.
 std::optional<Spread> spread(const OverlappingBodies& overlapping, const Measures& sliced, const Measures& stated);
 
-/// The patch of a pair with these measures, by slices. No value where sliced() has none.
-std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, const Measures& measures);
+/// The patch of a pair with this centroid and area vector, by slices. No value where sliced() has none.
+std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, Vec3 centroid, Vec3 area);
 
 /// Measures of bodies for which measure_at_once() is not accurate enough.
 MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping);

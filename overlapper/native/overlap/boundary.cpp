@@ -116,7 +116,7 @@ std::vector<int> contracted(std::span<const int> ring, std::span<const int> grou
 
 }  // namespace
 
-Patch patch_of(const Region& region, Vec3 centroid) {
+Patch patch_of(const Region& region, Vec3 centroid, const std::optional<Vec3>& direction) {
   const Polytope& p = region.polytope;
   const Ridges ridges(p);
   const auto along_border = [&](const auto& use) {
@@ -133,7 +133,7 @@ Patch patch_of(const Region& region, Vec3 centroid) {
   };
   SumInPairs<Vec3> area;
   along_border([&](Vec3 from, Vec3 to) { area.add(cross(from, to) / 2); });
-  PatchSums sums(centroid - region.reference - region.frame.origin, area.total());
+  PatchSums sums(centroid - region.reference - region.frame.origin, seen_along(area.total(), direction));
   along_border([&](Vec3 from, Vec3 to) { sums.add_edge(from, to); });
   Patch patch = sums.patch();
   patch.centre += region.frame.origin + region.reference;

@@ -22,8 +22,8 @@ struct Boundary {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
   }
 };
-/// The patch of a pair, from the ridges where the owner changes.
-Patch patch_of(const Region& region, Vec3 centroid);
+/// The patch of a pair, from the ridges where the owner changes. It is seen along `direction` if it is given.
+Patch patch_of(const Region& region, Vec3 centroid, const std::optional<Vec3>& direction);
 
 /// The boundary of the common set of `bodies` bodies.
 Boundary boundary_of(const Region& region, int bodies);

@@ -114,18 +114,18 @@ const Boundary& Overlap::boundary() const {
 
 const Patch& Overlap::patch() const {
   assert(pair());
-  return lazy().patch.get([this] { return patch_of_overlap(); });
+  return lazy().patch.get([this] { return patch_of_overlap({}); });
 }
 
-Patch Overlap::patch_of_overlap() const {
+Patch Overlap::patch_of_overlap(const std::optional<Vec3>& direction) const {
   if (status_ != Status::kOverlapping) return PatchSums({}, {}).patch();
   std::optional<Patch> exact;
-  if (way() == Way::kClipping || way() == Way::kWideClipping) exact = clipped_patch(two_[0], two_[1]);
-  const Vec3 area = Vec3{} + measures().pulls[1].force;
+  if (way() == Way::kClipping || way() == Way::kWideClipping) exact = clipped_patch(two_[0], two_[1], direction);
+  const Vec3 area = Vec3{} + seen_along(measures().pulls[1].force, direction);
   if (way() == Way::kClosedForm) exact = closed_forms::section_patch(two_[0], two_[1], centroid(), area);
   if (!exact && (way() == Way::kClosedForm || way() == Way::kSlicing))
-    exact = sliced_patch(overlapping_bodies(), measures());
-  Patch patch = exact ? *exact : patch_of(drawn(), centroid());
+    exact = sliced_patch(overlapping_bodies(), centroid(), area);
+  Patch patch = exact ? *exact : patch_of(drawn(), centroid(), direction);
   patch.area = area;
   return patch;
 }

@@ -61,6 +61,9 @@ class Overlap {
   const Boundary& boundary() const;
   /// Only for a pair; without an area unless overlapping.
   const Patch& patch() const;
+  /// The same, seen along a unit direction. It includes only the surfaces that are seen, without vertical walls if the
+  /// direction is vertical.
+  Patch patch_along(Vec3 direction) const { return patch_of_overlap(direction); }
 
   /// The derivatives of the volume, per body: d volume / d translation, then / d rotation vector about the body's
   /// position. Zeros unless overlapping.
@@ -104,7 +107,7 @@ class Overlap {
   const std::optional<MeasuresAndInertia>& sliced_with_area() const;
   const MeasuresAndInertia& in_full() const;
   Region region_of_overlap() const;
-  Patch patch_of_overlap() const;
+  Patch patch_of_overlap(const std::optional<Vec3>& direction) const;
   OverlappingBodies overlapping_bodies() const;
   MeasuresAndInertia measured_in_full() const;
   const Region& finest_region() const;

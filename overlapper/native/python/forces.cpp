@@ -70,9 +70,50 @@ Pose to_pose(nb::handle given) {
   return make_placed(Sphere(1), frame.position, frame.orientation).pose;
 }
 
+/// The top of a prism of a height field, for the patch of the prism with another shape. The walls of the prism are
+/// vertical and inside the field, so nothing presses against them.
+struct Top {
+  Vec3 up, normal;  ///< unit, on the side of the row's first shape
+};
+
+/// The tops of rows with a prism. `tops` has the normal of each prism's top in its own frame, and zeros for all other
+/// shapes.
+std::vector<std::optional<Top>> tops_of(const Overlaps& found, std::span<const Vec3> tops) {
+  std::vector<std::optional<Top>> seen(found.size());
+  for (size_t i = 0; i < found.size(); ++i) {
+    for (int side : {0, 1}) {
+      const int shape = found.pairs[i][side];
+      if (shape >= int(tops.size()) || tops[shape] == Vec3{}) continue;
+      const PoseNumbers& at = (*found.poses)[shape];
+      const Mat3 turn = make_placed(Sphere(1), {}, {at[3], at[4], at[5], at[6]}).pose.rotation;
+      const double sign = side == 0 ? -1 : 1;
+      seen[i] = Top{sign * (turn * Vec3{0, 0, 1}), sign * (turn * unit(tops[shape]))};
+    }
+  }
+  return seen;
+}
+
+/// The patch of each row: that of the top for prisms.
+std::vector<Patch> patches_of(const Overlaps& found, std::span<const std::optional<Top>> tops) {
+  std::vector<Patch> patches;
+  for (size_t i = 0; i < found.size(); ++i) {
+    const auto& pull = found.gradient[i][1];
+    const Vec3 area{pull[0], pull[1], pull[2]};
+    if (!tops[i]) {
+      patches.push_back(found.patch(i));
+      patches.back().area = area;
+    } else if (dot(area, tops[i]->up) > kNoDirection * found.area[i]) {
+      patches.push_back(lifted(found.patch(i, tops[i]->up), found.centroid[i], tops[i]->normal));
+    } else {
+      patches.push_back(PatchSums({}, {}).patch());
+    }
+  }
+  return patches;
+}
+
 nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps& found, nb::handle links_given,
                  nb::handle stiffness_given, nb::handle dissipation_given, nb::handle friction_given,
-                 nb::handle damping_given) {
+                 nb::handle damping_given, nb::handle tops_given) {
   std::vector<Pose> frames;
   for (nb::handle each : frames_given) frames.push_back(to_pose(each));
   const size_t count = found.size(), links = size_t(solver.bodies().links());
@@ -83,7 +124,11 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
   const auto friction = numbers(friction_given, "friction", count);
   std::vector<double> damping(count);
   if (!damping_given.is_none()) damping = numbers(damping_given, "damping", count);
-  const auto& [centre, moments, distance] = unlocked([&]() -> const Overlaps::Patches& { return found.patches(); });
+  std::vector<Vec3> tops(link_of.size());
+  if (!tops_given.is_none()) tops = to_rows(tops_given, "tops");
+  if (tops.size() != link_of.size()) fail("tops", "must have a row for each shape");
+  const std::vector<std::optional<Top>> seen = tops_of(found, tops);
+  const std::vector<Patch> shared = unlocked([&] { return patches_of(found, seen); });
   std::vector<ElasticPatch> patches(count);
   for (size_t i = 0; i < count; ++i) {
     const auto [a, b] = found.pairs[i];
@@ -93,18 +138,17 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
     ElasticPatch& patch = patches[i];
     patch.key = std::int64_t(a) << 32 | b;
     patch.link_a = int(link_of[a]), patch.link_b = int(link_of[b]);
-    patch.normal = found.normal[i];
+    patch.normal = seen[i] ? seen[i]->normal : found.normal[i];
     patch.stiffness = stiffness[i], patch.dissipation = dissipation[i];
     patch.damping = damping[i], patch.friction = friction[i];
     if (found.status[i] != std::int8_t(Status::kOverlapping)) continue;
     patch.force = stiffness[i] * found.volume[i];
     patch.centroid = found.centroid[i];
-    const auto& pull = found.gradient[i][1];
-    const Vec3 area{pull[0], pull[1], pull[2]};
-    if (!(norm(area) > kNoDirection * found.area[i]) || !finite(centre[i])) continue;
+    const auto& [area, centre, moments, distance] = shared[i];
+    if (!(norm(area) > kNoDirection * found.area[i]) || !finite(centre)) continue;
     patch.area = norm(area);
     patch.normal = unit(area);
-    patch.centre = centre[i], patch.moments = moments[i], patch.distance = distance[i];
+    patch.centre = centre, patch.moments = moments, patch.distance = distance;
   }
   std::vector<double> frequency2 = solver.place(frames, std::move(patches));
   const size_t rows = frequency2.size();
@@ -223,17 +267,20 @@ numbers for the coordinates of its tree; w is the size of the largest tree.)");
       "Another one that knows the same of the last step: what it solves changes nothing here.");
   cls.def(
       "place", &place, "frames"_a, "overlaps"_a, "links"_a, "stiffness"_a, "dissipation"_a, "friction"_a,
-      "damping"_a.none() = nb::none(),
+      "damping"_a.none() = nb::none(), "tops"_a.none() = nb::none(),
       nb::sig(
           "def place(self, frames: collections.abc.Sequence[typing.Any], overlaps: Overlaps, links: "
           "numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: "
-          "numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike, damping: numpy.typing.ArrayLike | None = None) "
+          "numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike, damping: numpy.typing.ArrayLike | None = None, "
+          "tops: numpy.typing.ArrayLike | None = None) "
           "-> numpy.typing.NDArray[numpy.float64]"),
       R"(Put the links where they are, and take what their shapes share; `links` (k,) is the place of each shape's link.
 
 `frames` begin with position and quaternion of the inertial frame, as pybullet's answers do. By row of `overlaps` (p,):
 stiffness in Pa/m, dissipation in s, the coefficient of friction, and the damping ratio along the normal, which is 0
-if it is not given. The answer (p,) is the square of a frequency,
+if it is not given. `tops` (k, 3) has the normal of the top of each prism of a height field, in the frame of the prism,
+and zeros for other shapes. A prism presses with its top alone, because its vertical walls are inside the field. The
+answer (p,) is the square of a frequency,
 (rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.)");
   cls.def(
       "ahead", &ahead, "duration"_a, "velocity"_a, "links"_a, "positions"_a, "orientations"_a,

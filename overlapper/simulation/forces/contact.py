@@ -244,8 +244,9 @@ class VolumetricContact:
         """
         self._mechanics.pose()
         self._follow()
-        contacts = self.bodies.overlaps(pairs=self._among)
-        return mean(contacts, self._parts, self._masses.stiffness(contacts.overlaps))
+        contacts, masses = self.bodies.overlaps(pairs=self._among), self._masses
+        found = contacts.overlaps
+        return mean(contacts, self._parts, masses.stiffness(found), masses.areas(found))
 
     @property
     def last(self) -> Forces:

@@ -158,16 +158,15 @@ class Forces(Tabular):
         )
 
 
-def mean(contacts: Contacts, parts: Sequence[tuple[float, Forces]], stiffness: Array) -> Forces:
+def mean(contacts: Contacts, parts: Sequence[tuple[float, Forces]], stiffness: Array, area: Array) -> Forces:
     """Return the mean forces of a step for the overlaps now.
 
     `parts` are the parts of the step: each has its fraction of the step and its forces. `slip` is that of the last
-    part. `stiffness` (p,) in Pa/m is that of the contacts.
+    part. `stiffness` (p,) in Pa/m and the area vectors `area` (p, 3) in m² are those of the contacts.
     """
     found = contacts.overlaps
     count = 1 + max(int(each.pairs.max(initial=0)) for each in (found, *(part.contacts.overlaps for _, part in parts)))
     codes = _codes(found, count)
-    area = found.gradient[:, 1, :3]
     size = np.linalg.norm(area, axis=1)
     directed = (size > NO_PATCH * found.area) | (found.volume == 0)
     normal: Array = np.array(found.normal)

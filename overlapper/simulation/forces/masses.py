@@ -8,6 +8,7 @@ import numpy as np
 
 from overlapper import Batch, Overlaps
 from overlapper._core import ContactSolver
+from overlapper.quaternion import rotated
 from overlapper.simulation.asked_pairs import Among
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.forces.parameter import Layers
@@ -27,6 +28,7 @@ class Masses:
         self.keys = bodies.keys
         self.dynamics = mechanics.dynamics(sorted({body for body, _, _ in self.keys}))
         self._links = np.array([self.dynamics.place[body, link] for body, link, _ in self.keys], dtype=np.int64)
+        self._tops = bodies.tops
         self._batch = Batch(bodies.shapes)  # for what is not yet: the one of `bodies` knows what is
 
     def are_stale(self) -> bool:
@@ -36,13 +38,29 @@ class Masses:
         """(p,) the stiffness of each row in Pa/m."""
         return self._layers.of(self._links[found.pairs], self.dynamics)[0]
 
+    def areas(self, found: Overlaps) -> Array:
+        """(p, 3) the area vectors of the patches, m², from the second to the first, at the poses now.
+
+        A prism of a height field presses with its top alone.
+        """
+        areas: Array = np.array(found.gradient[:, 1, :3])
+        for side, sign in ((0, -1.0), (1, 1.0)) if self._tops is not None else ():
+            assert self._tops is not None
+            tops = self._tops[found.pairs[:, side]]
+            rows = np.flatnonzero(tops.any(axis=1))
+            turns = self._bodies.orientations[found.pairs[rows, side]]
+            up, normals = sign * rotated(turns, np.array([0.0, 0.0, 1.0])), sign * rotated(turns, tops[rows])
+            seen = np.maximum((areas[rows] * up).sum(axis=1), 0) / (up * normals).sum(axis=1)
+            areas[rows] = seen[:, None] * normals
+        return areas
+
     def place(self, solver: ContactSolver, frames: Sequence[Pose], found: Overlaps) -> tuple[Array, Array]:
         """Give a solver the overlaps of links that have these frames.
 
         Returns by row the squares of frequencies (rad²/s²) and the stiffness (Pa/m).
         """
         layers = self._layers.of(self._links[found.pairs], self.dynamics)
-        return solver.place(frames, found, self._links, *layers), layers[0]
+        return solver.place(frames, found, self._links, *layers, tops=self._tops), layers[0]
 
     def velocity(self) -> tuple[Array, set[int]]:
         """Return the velocities of all coordinates and the bodies that are lost.

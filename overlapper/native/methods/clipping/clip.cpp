@@ -142,11 +142,12 @@ class Sums {
 /// A wanted patch. The body is the second one, or the first one if swapped.
 struct WantedPatch {
   bool swapped;
+  std::optional<Vec3> direction;  ///< to see it along
   Patch patch{};
 
   /// Finds the patch from the seam, which is counter-clockwise around the first body's part.
   void find(const Workspace& w, Vec3 centroid, Vec3 force_on_first) {
-    PatchSums sums(centroid, swapped ? force_on_first : -force_on_first);
+    PatchSums sums(centroid, seen_along(swapped ? force_on_first : -force_on_first, direction));
     for (const Edge& e : w.seam) {
       const Vec3 from = w.vertices[e.from], to = w.vertices[e.to];
       swapped ? sums.add_edge(from, to) : sums.add_edge(to, from);
@@ -235,6 +236,7 @@ void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reac
   const Pull pull = sums.pull();
   on_first = {apply_transposed(axes, pull.force), apply_transposed(axes, pull.moment)};
   if (!wanted) return;
+  if (wanted->direction) wanted->direction = axes * *wanted->direction;
   wanted->find(w, sums.centroid(), pull.force);
   wanted->patch = turned(wanted->patch, transposed(axes), middle);
 }
@@ -368,9 +370,10 @@ std::optional<Measures> clip(const Placed& a, const Placed& b, std::optional<Sid
   return common;
 }
 
-std::optional<Patch> clipped_patch(const Placed& a, const Placed& b) {
-  WantedPatch wanted{!comes_first(a, b)};
+std::optional<Patch> clipped_patch(const Placed& a, const Placed& b, std::optional<Vec3> direction) {
+  WantedPatch wanted{!comes_first(a, b), {}};
   const Placed &first = wanted.swapped ? b : a, &second = wanted.swapped ? a : b;
+  if (direction) wanted.direction = apply_transposed(first.pose.rotation, *direction);
   Measures common;
   Pull on_first{};
   if (!clip_in_first(first, second, common, on_first, &wanted) || !common.measured) return std::nullopt;

@@ -27,8 +27,9 @@ using SideAreas = std::array<Vec3, 2>;
 /// If the answer is measured, `sides` gets its areas unless it is null.
 std::optional<Measures> clip(const Placed& a, const Placed& b, std::optional<SideAreas>* sides = nullptr);
 
-/// The patch of a pair that clip() has measured, in world coordinates. For other pairs there may be no value.
-std::optional<Patch> clipped_patch(const Placed& a, const Placed& b);
+/// The patch of a pair that clip() has measured, in world coordinates. For other pairs there may be no value. The patch
+/// is seen along `direction` if it is given.
+std::optional<Patch> clipped_patch(const Placed& a, const Placed& b, std::optional<Vec3> direction = {});
 
 /// The same for any number of bodies: the third body clips the common polytope of the first two, and so on. Also no
 /// value if doubles are not accurate enough for the measures.
