@@ -1154,6 +1154,40 @@ class Batch:
             Indices i < j of the two shapes, sorted.
         """
 
+class WeldRule:
+    """
+    MuJoCo's rule of which geoms may collide.
+
+    Parameters
+    ----------
+    geoms : (n, 7) array_like of int
+        Of each geom: contype, conaffinity, its body, the first body of the welded group, the parent of that body, whether no
+        joint moves the group, and whether the geom is a plane or a height field.
+    excluded : (e,) array_like of int
+        Pairs of bodies: 65536 times the lesser number plus the greater.
+    listed : (p, 2) array_like of int
+        Pairs of rows of `geoms` that may collide in any case.
+    by_parent : bool
+        Whether parent and child may not collide.
+    none : bool
+        Whether no geoms may collide.
+    """
+
+    def __init__(self, geoms: numpy.typing.ArrayLike, excluded: numpy.typing.ArrayLike, listed: numpy.typing.ArrayLike, by_parent: bool, none: bool) -> None: ...
+
+    def allow(self, first: numpy.typing.ArrayLike, second: numpy.typing.ArrayLike, listed: bool = True) -> numpy.typing.NDArray[numpy.bool_]:
+        """
+        (p,) whether the geoms in these rows may collide, pair by pair; without `listed`, by the other rules alone.
+        """
+
+    def lists(self, first: int, second: int) -> bool:
+        """Whether the pair of geoms in these rows is listed, and may collide."""
+
+    def count(self, weights: numpy.typing.ArrayLike) -> int:
+        """
+        The number of pairs of shapes that may collide; `weights` (n,) is the number of shapes of each geom.
+        """
+
 class PairMask:
     """
     Which pairs of shapes may be measured.
@@ -1167,6 +1201,12 @@ class PairMask:
     """
 
     def __init__(self, groups: numpy.typing.ArrayLike, table: numpy.typing.NDArray[numpy.bool_]) -> None: ...
+
+    @staticmethod
+    def of_rule(groups: numpy.typing.ArrayLike, rule: WeldRule) -> PairMask:
+        """
+        The pairs that a rule lets collide; `groups` (k,) are the geoms of the shapes, by row of the rule.
+        """
 
 def masked_overlaps(batch: Batch, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, mask: PairMask, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto') -> Overlaps:
     """

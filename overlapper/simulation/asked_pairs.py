@@ -52,15 +52,16 @@ class AskedPairs:
         return np.asarray((a != b) & rules.allow(a, b))
 
     def mask(self, rules: Rules) -> _core.PairMask | None:
-        """The pairs that the simulator lets collide, as a table. None if there is no table, or not yet.
+        """The pairs that the simulator lets collide, for the core. None if the core cannot decide, or not yet.
 
-        The table is made at the second call with the same rules. Rules that change in every step get no table.
+        A table of all pairs of links is made at the second call with the same rules, if the core does not know rules of
+        this kind. Rules that change in every step get no table.
         """
-        if not rules.lasting or len(self.layout.collider_rows) > TABLED:
+        if not rules.lasting:
             return None
         if self._masked is None or self._masked[0] is not rules:
-            self._masked = rules, None
-        elif self._masked[1] is None:
+            self._masked = rules, rules.mask(self.layout.colliders)
+        elif self._masked[1] is None and len(self.layout.collider_rows) <= TABLED:
             count = len(self.layout.collider_rows)
             table = np.zeros((count, count), dtype=bool)
             first, second = np.triu_indices(count, 1)

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper._core import PairMask
 from overlapper.simulation.model import LinkKey
 
 Indices = NDArray[np.intp]
@@ -46,6 +47,10 @@ class Rules(Protocol):
 
     def count(self, weights: NDArray[np.int64]) -> int:
         """How many pairs of shapes may collide, if `weights` (n,) says how many each collider has."""
+
+    def mask(self, colliders: Indices) -> PairMask | None:
+        """The rules for the core, if it knows rules of this kind; `colliders` (k,) is the row of each shape's link."""
+        return None
 
 
 class MaskRules(Rules):

@@ -249,6 +249,28 @@ def test_pairs_are_exactly_those_that_mj_collision_looks_at(seeds):
         assert bodies.report().pairs_possible == len(looked_at)
 
 
+def test_more_geoms_than_a_table_holds_have_the_same_pairs():
+    """300 geoms in chains, with masks, an exclude and an explicit pair."""
+    chance, bodies = np.random.default_rng(5), ""
+    for k in range(100):
+        at = " ".join(f"{each:.3f}" for each in chance.uniform(-0.5, 0.5, 3))
+        part = '<geom name="{}" size=".06" contype="{}" conaffinity="{}" pos="{} 0 0"/>'
+        parts = [part.format(f"g{k}_{j}", *chance.integers(1, 4, 2), 0.05 * j) for j in range(3)]
+        inner = f'<body name="i{k}" pos=".05 0 0"><joint/>{parts[1]}{parts[2]}</body>'
+        bodies += f'<body name="o{k}" pos="{at}"><freejoint/>{parts[0]}{inner}</body>'
+    contact = '<exclude body1="o1" body2="o2"/><pair geom1="g3_0" geom2="g3_1"/>'
+    model, data = simulated(f"<mujoco><worldbody>{bodies}</worldbody><contact>{contact}</contact></mujoco>")
+    bodies = Bodies(model, data)
+    for _ in range(2):
+        ours = {(each.geomA, each.geomB) for each in bodies.overlaps() if each.overlap}
+        assert ours == pairs_of_mujoco(data, lambda each: each.dist < 0)
+        model.geom_contype[:20] = 0
+        mujoco.mj_setConst(model, data)
+        mujoco.mj_forward(model, data)
+        bodies.update()
+    assert len(ours) > 100
+
+
 def test_a_contact_filter_in_python_decides_as_in_mj_collision():
     """With a filter, mj_collision asks the masks of bodies, and of geoms only whether there is a mask."""
     discarded = 0

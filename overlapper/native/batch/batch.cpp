@@ -210,7 +210,7 @@ struct Batch::Memory {
   }
 
   void place(std::span<const double> positions, std::span<const double> orientations);
-  void find_pairs(std::vector<IndexPair>& pairs);
+  void find_pairs(const PairMask* mask, std::vector<IndexPair>& pairs);
   void begin(std::span<const IndexPair> pairs);
   void recall(std::span<const IndexPair> pairs);
   bool answer(size_t i, double with_tolerance, Method by_method);
@@ -236,12 +236,12 @@ void Batch::Memory::place(std::span<const double> positions, std::span<const dou
   poses = std::move(now);
 }
 
-/// The pairs whose boxes meet. Calls with named pairs skip this search, because boxes take longer than moving the
-/// bodies.
-void Batch::Memory::find_pairs(std::vector<IndexPair>& pairs) {
+/// The pairs whose boxes meet, if `mask` admits them or is null. Calls with named pairs skip this search, because boxes
+/// take longer than moving the bodies.
+void Batch::Memory::find_pairs(const PairMask* mask, std::vector<IndexPair>& pairs) {
   for (size_t i = 0; i < bodies.size(); ++i)
     if (std::exchange(enclosed[i], bodies[i].version) != bodies[i].version) enclosures[i] = enclosure(bodies[i].placed);
-  tree.pairs(enclosures, pairs);
+  tree.pairs(enclosures, mask, pairs);
 }
 
 void Batch::Memory::begin(std::span<const IndexPair> pairs) {
@@ -327,7 +327,7 @@ std::vector<IndexPair> Batch::candidate_pairs(std::span<const double> positions,
   Borrowed memory(*this);
   memory->place(positions, orientations);
   std::vector<IndexPair> pairs;
-  memory->find_pairs(pairs);
+  memory->find_pairs(nullptr, pairs);
   return pairs;
 }
 
@@ -340,8 +340,7 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   memory->place(positions, orientations);
   finished = true;
   if (!given) try {
-      memory->find_pairs(memory->candidates);
-      if (mask) std::erase_if(memory->candidates, [&](const IndexPair& pair) { return !mask->admits(pair); });
+      memory->find_pairs(mask, memory->candidates);
     } catch (const Cancelled&) {
       finished = false;
       memory->candidates.clear();

@@ -122,15 +122,6 @@ inline constexpr std::tuple kColumns{
                  [](const Overlaps::Row& row) { return static_cast<char>(overlapper::widened(row.measures.way)); },
                  "(p,) True where the volume was computed again in double-double arithmetic."}};
 
-/// Which pairs may be measured: shapes belong to groups, and a table says for each pair of groups whether it may.
-struct PairMask {
-  std::vector<int> group;   ///< of each shape
-  std::vector<char> table;  ///< row by row, as many rows and columns as groups
-  size_t groups = 0;
-
-  bool admits(const IndexPair& pair) const { return table[groups * group[pair[0]] + group[pair[1]]]; }
-};
-
 /// The pairs of moving shapes. Results of the last call are reused if they prove the same answer. Several threads may
 /// call it at once. One thread uses the memory, and the others work without it.
 class Batch {

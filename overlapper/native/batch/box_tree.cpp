@@ -141,7 +141,7 @@ void BoxTree::sort(std::vector<IndexPair>& pairs) {
     std::sort(pairs.begin() + begin, pairs.begin() + starts_[i]);
 }
 
-void BoxTree::pairs(std::span<const Enclosure> bodies, std::vector<IndexPair>& pairs) {
+void BoxTree::pairs(std::span<const Enclosure> bodies, const PairMask* mask, std::vector<IndexPair>& pairs) {
   found_.clear();
   looked_at_ = 0;
   starts_.resize(bodies.size() + 1);
@@ -162,6 +162,7 @@ void BoxTree::pairs(std::span<const Enclosure> bodies, std::vector<IndexPair>& p
   for (int h : open_)
     for (int i : order_)
       if (meet(bodies[h].plane, bodies[i].box)) found_.push_back({h, i});
+  if (mask) std::erase_if(found_, [&](const IndexPair& pair) { return !mask->admits(pair); });
   sort(pairs);
 }
 

@@ -4,11 +4,10 @@
 #include <span>
 #include <vector>
 
+#include "batch/pair_mask.h"
 #include "shapes/shape.h"
 
 namespace overlapper {
-
-using IndexPair = std::array<int, 2>;
 
 /// Bounds of a placed shape.
 struct Enclosure {
@@ -26,8 +25,9 @@ Enclosure enclosure(const Placed& placed);
 /// little work as the first one.
 class BoxTree {
  public:
-  /// Pairs i < j, sorted. A half-space meets a box that reaches into it. Two half-spaces make no pair.
-  void pairs(std::span<const Enclosure> bodies, std::vector<IndexPair>& pairs);
+  /// Pairs i < j that `mask` admits or all pairs, sorted. A half-space meets a box that reaches into it. Two
+  /// half-spaces make no pair.
+  void pairs(std::span<const Enclosure> bodies, const PairMask* mask, std::vector<IndexPair>& pairs);
 
  private:
   /// A box around the bodies order_[begin] ... order_[end - 1]. Nodes are in depth-first order: the first half of node

@@ -16,7 +16,7 @@ std::vector<IndexPair> pairs_that_meet(std::span<const Placed> a, std::span<cons
   for (const auto& rows : {a, b})
     for (const Placed& row : rows) enclosures.push_back(enclosure(row));
   std::vector<IndexPair> pairs;
-  BoxTree().pairs(enclosures, pairs);
+  BoxTree().pairs(enclosures, nullptr, pairs);
   const int first = static_cast<int>(a.size());
   std::erase_if(pairs, [&](const IndexPair& pair) { return pair[0] >= first || pair[1] < first; });
   for (IndexPair& pair : pairs) pair[1] -= first;

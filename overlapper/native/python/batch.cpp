@@ -103,6 +103,65 @@ PairMask to_mask(nb::handle groups_given, nb::handle table_given) {
   return mask;
 }
 
+/// A row of `geoms` has the numbers of a WeldRule::Geom, in their order.
+WeldRule to_rule(nb::handle geoms_given, nb::handle excluded_given, nb::handle listed_given, bool by_parent,
+                 bool none) {
+  WeldRule rule;
+  const std::vector<std::int64_t> geoms = to_indices(geoms_given, "geoms", 7);
+  for (size_t i = 0; i < geoms.size(); i += 7) {
+    const auto at = [&](size_t k) { return static_cast<int>(geoms[i + k]); };
+    rule.geoms.push_back({at(0), at(1), at(2), at(3), at(4), at(5) != 0, at(6) != 0});
+  }
+  const auto count = static_cast<std::int64_t>(rule.geoms.size());
+  rule.excluded = to_indices(excluded_given, "excluded");
+  const std::vector<std::int64_t> listed = to_indices(listed_given, "listed", 2);
+  for (size_t i = 0; i < listed.size(); i += 2) {
+    const auto [a, b] = std::minmax(listed[i], listed[i + 1]);
+    if (a < 0 || b >= count) fail("listed", "must have rows of geoms");
+    rule.listed.push_back(a * count + b);
+  }
+  std::ranges::sort(rule.excluded), std::ranges::sort(rule.listed);
+  rule.by_parent = by_parent, rule.none = none;
+  return rule;
+}
+
+nb::object allowed(const WeldRule& rule, nb::handle first_given, nb::handle second_given, bool listed) {
+  const std::vector<std::int64_t> first = to_indices(first_given, "first"), second = to_indices(second_given, "second");
+  if (first.size() != second.size()) fail("second", "must be as long as first");
+  const auto count = static_cast<std::int64_t>(rule.geoms.size());
+  auto* flags = new std::vector<char>();
+  const nb::capsule owner(flags, [](void* p) noexcept { delete static_cast<std::vector<char>*>(p); });
+  for (size_t i = 0; i < first.size(); ++i) {
+    if (std::min(first[i], second[i]) < 0 || std::max(first[i], second[i]) >= count) fail("first", "must index geoms");
+    const int a = static_cast<int>(first[i]), b = static_cast<int>(second[i]);
+    flags->push_back(listed ? rule.admits(a, b) : rule.admits_unlisted(a, b));
+  }
+  using Flags = nb::ndarray<nb::numpy, bool, nb::ndim<1>>;
+  return nb::cast(Flags(flags->data(), {flags->size()}, owner));
+}
+
+std::int64_t count_of(const WeldRule& rule, nb::handle weights_given) {
+  const std::vector<std::int64_t> weights = to_indices(weights_given, "weights");
+  if (weights.size() != rule.geoms.size()) fail("weights", "must be one for each geom");
+  std::int64_t total = 0;
+  for (int a = 0; a < static_cast<int>(weights.size()); ++a) {
+    if (weights[a] == 0) continue;
+    for (int b = a + 1; b < static_cast<int>(weights.size()); ++b)
+      if (weights[b] != 0 && rule.admits(a, b)) total += weights[a] * weights[b];
+  }
+  return total;
+}
+
+PairMask mask_of_rule(nb::handle groups_given, const WeldRule& rule) {
+  PairMask mask;
+  for (std::int64_t group : to_indices(groups_given, "groups")) {
+    if (group < 0 || group >= static_cast<std::int64_t>(rule.geoms.size())) fail("groups", "must be geoms of the rule");
+    mask.group.push_back(static_cast<int>(group));
+  }
+  mask.rule = std::make_shared<const WeldRule>(rule);
+  return mask;
+}
+
 nb::object masked_overlaps(Batch& batch, nb::handle positions, nb::handle orientations, const PairMask& mask,
                            nb::handle tolerance, nb::handle threads, nb::handle method) {
   if (mask.group.size() != batch.shapes().size()) fail("mask", "must have a group for each shape of the batch");
@@ -435,6 +494,44 @@ int to_threads(nb::handle given) {
 void define_batch(nb::module_& m) {
   define_overlaps_class(m);
   define_batch_class(m);
+  nb::class_<WeldRule>(m, "WeldRule", R"(MuJoCo's rule of which geoms may collide.
+
+Parameters
+----------
+geoms : (n, 7) array_like of int
+    Of each geom: contype, conaffinity, its body, the first body of the welded group, the parent of that body, whether no
+    joint moves the group, and whether the geom is a plane or a height field.
+excluded : (e,) array_like of int
+    Pairs of bodies: 65536 times the lesser number plus the greater.
+listed : (p, 2) array_like of int
+    Pairs of rows of `geoms` that may collide in any case.
+by_parent : bool
+    Whether parent and child may not collide.
+none : bool
+    Whether no geoms may collide.)")
+      .def(
+          "__init__",
+          [](WeldRule* self, nb::handle geoms, nb::handle excluded, nb::handle listed, bool by_parent, bool none) {
+            new (self) WeldRule(to_rule(geoms, excluded, listed, by_parent, none));
+          },
+          "geoms"_a, "excluded"_a, "listed"_a, "by_parent"_a, "none"_a,
+          nb::sig("def __init__(self, geoms: numpy.typing.ArrayLike, excluded: numpy.typing.ArrayLike, listed: "
+                  "numpy.typing.ArrayLike, by_parent: bool, none: bool) -> None"))
+      .def(
+          "allow", &allowed, "first"_a, "second"_a, "listed"_a = true,
+          nb::sig("def allow(self, first: numpy.typing.ArrayLike, second: numpy.typing.ArrayLike, listed: bool = True) "
+                  "-> numpy.typing.NDArray[numpy.bool_]"),
+          "(p,) whether the geoms in these rows may collide, pair by pair; without `listed`, by the other rules alone.")
+      .def(
+          "lists",
+          [](const WeldRule& rule, int first, int second) {
+            const int count = static_cast<int>(rule.geoms.size());
+            if (std::min(first, second) < 0 || std::max(first, second) >= count) fail("first", "must index geoms");
+            return rule.lists(first, second);
+          },
+          "first"_a, "second"_a, "Whether the pair of geoms in these rows is listed, and may collide.")
+      .def("count", &count_of, "weights"_a, nb::sig("def count(self, weights: numpy.typing.ArrayLike) -> int"),
+           "The number of pairs of shapes that may collide; `weights` (n,) is the number of shapes of each geom.");
   nb::class_<PairMask>(m, "PairMask", R"(Which pairs of shapes may be measured.
 
 Parameters
@@ -448,7 +545,10 @@ table : (g, g) ndarray of bool
           [](PairMask* self, nb::handle groups, nb::handle table) { new (self) PairMask(to_mask(groups, table)); },
           "groups"_a, "table"_a,
           nb::sig("def __init__(self, groups: numpy.typing.ArrayLike, table: numpy.typing.NDArray[numpy.bool_]) -> "
-                  "None"));
+                  "None"))
+      .def_static("of_rule", &mask_of_rule, "groups"_a, "rule"_a,
+                  nb::sig("def of_rule(groups: numpy.typing.ArrayLike, rule: WeldRule) -> PairMask"),
+                  "The pairs that a rule lets collide; `groups` (k,) are the geoms of the shapes, by row of the rule.");
   m.def("masked_overlaps", &masked_overlaps, "batch"_a, "positions"_a, "orientations"_a, "mask"_a, "tolerance"_a = 1e-3,
         "threads"_a.none() = 1, "method"_a = "auto",
         nb::sig("def masked_overlaps(batch: Batch, positions: numpy.typing.ArrayLike, orientations: "

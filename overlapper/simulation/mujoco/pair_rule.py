@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper import _core
 from overlapper.simulation.collision_rules import Indices, Mask, Rules
 from overlapper.simulation.mujoco.geoms import HFIELD, PLANE
 from overlapper.simulation.mujoco.silence import asked_flags
@@ -49,53 +50,41 @@ class PairRule(Rules):
     """
 
     def __init__(self, model: Any, data: Any, geoms: NDArray[np.int64]) -> None:
-        body = model.geom_bodyid[geoms].astype(np.int64)
-        weld = model.body_weldid[body].astype(np.int64)
-        self._body, self._weld = body, weld
-        self._parent = model.body_weldid[model.body_parentid[weld]].astype(np.int64)
-        self._fixed = model.body_dofnum[weld] == 0
-        self._group, self._mask = model.geom_contype[geoms].copy(), model.geom_conaffinity[geoms].copy()
+        body = model.geom_bodyid[geoms]
+        weld = model.body_weldid[body]
+        parent = model.body_weldid[model.body_parentid[weld]]
+        group, mask = model.geom_contype[geoms], model.geom_conaffinity[geoms]
         self._geoms, self._model, self._data, self._filter = geoms.tolist(), model, data, contact_filter()
         if self._filter:
-            on = (self._group | self._mask) != 0
-            self._group = np.where(on, model.body_contype[body], 0)
-            self._mask = np.where(on, model.body_conaffinity[body], 0)
-        self._surface = np.isin(model.geom_type[geoms], (PLANE, HFIELD))
+            on = (group | mask) != 0
+            group = np.where(on, model.body_contype[body], 0)
+            mask = np.where(on, model.body_conaffinity[body], 0)
+        fixed, surface = model.body_dofnum[weld] == 0, np.isin(model.geom_type[geoms], (PLANE, HFIELD))
         flags = asked_flags(model)
-        self._by_parent = not flags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
-        self._none = bool(flags & NO_CONTACTS)
-        self._excluded = np.unique(model.exclude_signature.astype(np.int64))
         place = np.full(model.ngeom, -1)
         place[geoms] = np.arange(len(geoms))
-        first, second = place[model.pair_geom1], place[model.pair_geom2]
-        known = (first >= 0) & (second >= 0)
-        self._explicit = np.unique(self._code(np.minimum(first, second)[known], np.maximum(first, second)[known]))
+        explicit = np.stack([place[model.pair_geom1], place[model.pair_geom2]], axis=1)
+        explicit = explicit[(explicit >= 0).all(axis=1)]
+        numbers = np.stack([group, mask, body, weld, parent, fixed, surface], axis=1).astype(np.int64)
+        by_parent = not flags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
+        self._rule = _core.WeldRule(numbers, model.exclude_signature, explicit, by_parent, bool(flags & NO_CONTACTS))
         self.lasting = not self._filter
 
     def allow(self, first: Indices, second: Indices) -> Mask:
         """Whether the geoms at these indices may collide, pair by pair."""
-        if self._none:
-            return np.zeros(len(first), dtype=bool)
-        group, mask, weld, parent = self._group, self._mask, self._weld, self._parent
-        allowed = ((group[first] & mask[second]) | (group[second] & mask[first])) != 0
-        allowed &= (weld[first] != weld[second]) & ~(self._fixed[first] & self._fixed[second])
-        if self._by_parent:  # MuJoCo does not count the world as a parent
-            related = (weld[first] == parent[second]) | (weld[second] == parent[first])
-            allowed &= ~(related & (weld[first] != 0) & (weld[second] != 0))
-        if len(self._excluded):
-            a, b = self._body[first], self._body[second]
-            allowed &= ~np.isin((np.minimum(a, b) << 16) + np.maximum(a, b), self._excluded)
+        allowed = self._rule.allow(first, second)
         if self._filter:
-            for k in np.flatnonzero(allowed).tolist():
+            asked = self._rule.allow(first, second, listed=False)
+            for k in np.flatnonzero(asked).tolist():
                 a, b = self._geoms[first[k]], self._geoms[second[k]]
-                allowed[k] = not self._filter(self._model, self._data, a, b)
-        if len(self._explicit):
-            allowed |= np.isin(self._code(np.minimum(first, second), np.maximum(first, second)), self._explicit)
-        # Two planes, two height fields, or one of each have no contacts.
-        return np.asarray(allowed & ~(self._surface[first] & self._surface[second]))
+                if self._filter(self._model, self._data, a, b):
+                    allowed[k] = self._rule.lists(int(first[k]), int(second[k]))
+        return allowed
 
     def count(self, weights: NDArray[np.int64]) -> int:
         """How many pairs of shapes may collide, if `weights` (n,) says how many shapes each geom has."""
+        if not self._filter:
+            return self._rule.count(weights)
         places = np.flatnonzero(weights)
         total = 0
         at_once = max(1, ROWS // max(len(places), 1))
@@ -106,5 +95,5 @@ class PairRule(Rules):
             total += int((weights[a] * weights[b])[self.allow(a, b)].sum())
         return total
 
-    def _code(self, first: Indices, second: Indices) -> Indices:
-        return np.asarray(first * np.int64(len(self._body)) + second)
+    def mask(self, colliders: Indices) -> _core.PairMask:
+        return _core.PairMask.of_rule(colliders, self._rule)

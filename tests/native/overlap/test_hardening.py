@@ -115,6 +115,9 @@ def answers(seed):
     assert _core.finite_within(positions, orientations, 1e3)
     mask = _core.PairMask(np.arange(3), ~np.eye(3, dtype=bool))
     found["masked_overlaps"] = _core.masked_overlaps(Batch(shapes), positions, orientations, mask, TOLERANCE)
+    rule = _core.WeldRule([[1, 1, k, k, 0, False, False] for k in range(3)], [], [], True, False)
+    mask = _core.PairMask.of_rule(np.arange(3), rule)
+    found["WeldRule"] = _core.masked_overlaps(Batch(shapes), positions, orientations, mask, TOLERANCE)
     found["random_polytope"] = Placed(random_polytope(9, rng=rng))
     return {name: bits(value) for name, value in found.items()}
 
