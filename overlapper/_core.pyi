@@ -1280,14 +1280,55 @@ def world_poses(frames: Sequence[Any] | numpy.typing.NDArray[numpy.float64], whi
     the world are as long as `orientations`. They are not finite where a frame is not.
     """
 
-def chosen_frames(positions: numpy.typing.ArrayLike, quaternions: numpy.typing.ArrayLike, which: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+class FixedShapes:
     """
-    (k, 7) positions and quaternions xyzw in the rows `which`, for `world_poses`; `quaternions` are wxyz.
+    Shapes that are fixed to moving frames.
+
+    Parameters
+    ----------
+    which : (k,) array_like of int
+        The row of each shape's frame.
+    positions : (k, 3) array_like
+        In the frames, m.
+    orientations : (k, 4) array_like
+        Quaternions xyzw in the frames.
     """
 
-def finite_within(positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, farthest: float) -> bool:
+    def __init__(self, which: numpy.typing.ArrayLike, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> None: ...
+
+    def world(self, frames: Sequence[Any] | numpy.typing.NDArray[numpy.float64], farthest: float) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], bool]:
+        """
+        Positions and quaternions as of `world_poses`, and whether all of them are usable.
+
+        Usable poses are finite, and their coordinates are less than `farthest` in size.
+        """
+
+class ChosenFrames:
     """
-    Whether all numbers are finite, and those of the positions less than `farthest` in size.
+    Rows of arrays of poses that a simulator owns and changes.
+
+    Parameters
+    ----------
+    positions : (n, 3) ndarray
+        In m.
+    quaternions : (n, 4) ndarray
+        In the order wxyz.
+    which : (k,) array_like of int
+        The rows.
+    """
+
+    def __init__(self, positions: numpy.typing.NDArray[numpy.float64], quaternions: numpy.typing.NDArray[numpy.float64], which: numpy.typing.ArrayLike) -> None: ...
+
+    def read(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (k, 7) positions and quaternions xyzw of these rows now, for `FixedShapes.world`.
+        """
+
+def any_moved(positions: numpy.typing.ArrayLike, origin: numpy.typing.ArrayLike, turn: numpy.typing.ArrayLike, before: numpy.typing.ArrayLike, slack: numpy.typing.ArrayLike, meets: numpy.typing.NDArray[numpy.bool_]) -> bool:
+    """
+    Whether one of the points in `meets` (n,) has moved by more than its `slack` (n,) along an axis.
+
+    Coordinates are turn @ (position - origin). `before` (n, 3) are the earlier coordinates.
     """
 
 class Snapshot:

@@ -341,6 +341,8 @@ class AnyBodies:
             self._arrange()
             self._pose()
             self._rules = self._source.rules(self._layout)
+        if not skipped and not self._nowhere:
+            return
         for each in (*map(self._labelled, skipped or ()), *(self._lost(id) for id in sorted(self._nowhere - before))):
             message = f"{each.name} (body {each.body}, link {each.link}) is left out: {each.reason}"
             warnings.warn(message, SkippedShapeWarning, stacklevel=stacklevel)

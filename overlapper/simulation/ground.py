@@ -25,7 +25,7 @@ class GroundBelow:
         self.ground = ground
         self._reach = reach
         # The ground is modelled this far around a shape, and searched again when the shape has moved this far.
-        self._slack = np.maximum(min(ground.field.spacing) / 2, reach / 4)
+        self._slack = np.maximum(min(ground.field.spacing) / 2, reach / 4)  # infinite for planes
         self._asked = np.full((len(reach), 3), np.inf)
         self._frame: Pose = ()
         self._bounded = np.isfinite(reach)
@@ -38,12 +38,12 @@ class GroundBelow:
         """
         if frame != self._frame:
             ground, self._frame = self.ground, frame
-            self._origin, turn = _core.world_poses([frame], FIRST, ground.position[None], ground.orientation[None])
-            self._axes = rotated(turn, np.eye(3)).T
-        local = (centres - self._origin) @ self._axes
-        moved = meets & self._bounded & ~(np.abs(local - self._asked).max(axis=1) <= self._slack)
-        if not moved.any():
+            origin, turn = _core.world_poses([frame], FIRST, ground.position[None], ground.orientation[None])
+            self._origin, self._axes = origin[0], rotated(turn, np.eye(3))
+        if not _core.any_moved(centres, self._origin, self._axes, self._asked, self._slack, meets):
             return False
+        local = (centres - self._origin) @ self._axes.T
+        moved = meets & self._bounded & ~(np.abs(local - self._asked).max(axis=1) <= self._slack)
         moved &= np.isfinite(local).all(axis=1)
         self._asked[moved] = local[moved]
         for k in np.flatnonzero(moved):

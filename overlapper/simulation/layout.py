@@ -52,12 +52,12 @@ class Layout:
         self.key_rows = np.array(self.keys, dtype=np.int64).reshape(-1, 3)
         self.shapes = [each.shape for each in modelled]
         self.batch = Batch(self.shapes)
-        self._local_positions = np.array([each.position for each in modelled]).reshape(-1, 3)
-        self._local_orientations = np.array([each.orientation for each in modelled]).reshape(-1, 4)
+        local_positions = np.array([each.position for each in modelled]).reshape(-1, 3)
+        local_orientations = np.array([each.orientation for each in modelled]).reshape(-1, 4)
         tops = np.array([each.top for each in modelled]).reshape(-1, 3)
         self.tops: Array | None = tops if tops.any() else None
-        self.positions: Array = np.full_like(self._local_positions, np.nan)
-        self.orientations: Array = np.full_like(self._local_orientations, np.nan)
+        self.positions: Array = np.full_like(local_positions, np.nan)
+        self.orientations: Array = np.full_like(local_orientations, np.nan)
         links = {
             id: sorted(({each.link for each in shapes} | {each.link for each in bodies[id].grounds}) - {BASE})
             for id, shapes in shaped.items()
@@ -67,7 +67,8 @@ class Layout:
         self.collider_rows = {each: row for row, each in enumerate(sorted(self.poses.colliders))}
         self.colliders = np.array([self.collider_rows[id, link] for id, link, _ in self.keys], dtype=int)
         self._place = {each: row for row, each in enumerate(self.poses.colliders)}
-        self._places = np.array([self._place[id, link] for id, link, _ in self.keys], dtype=np.int64)
+        places = np.array([self._place[id, link] for id, link, _ in self.keys], dtype=np.int64)
+        self._fixed = _core.FixedShapes(places, local_positions, local_orientations)
         self.owners = np.array([id for id, _, _ in self.keys], dtype=int)
         self.of_several_colliders = [id for id, each in links.items() if each]
 
@@ -83,10 +84,8 @@ class Layout:
     def pose(self) -> set[int]:
         """Place the shapes by the present poses of their colliders. Returns the bodies with an unusable pose."""
         self._read = self.poses.read()
-        self.positions, self.orientations = _core.world_poses(
-            self._read, self._places, self._local_positions, self._local_orientations
-        )
-        if _core.finite_within(self.positions, self.orientations, FARTHEST):
+        self.positions, self.orientations, usable = self._fixed.world(self._read, FARTHEST)
+        if usable:
             return set()
         finite = (np.abs(self.positions) < FARTHEST).all(axis=1) & np.isfinite(self.orientations).all(axis=1)
         return {*self.owners[~finite].tolist()}

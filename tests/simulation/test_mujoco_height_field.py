@@ -283,7 +283,9 @@ def test_a_cube_on_a_slope_of_prisms_rests_at_the_depth_of_its_weight():
 def test_walls_at_the_border_of_a_field_are_free():
     field = Bodies(*hills(free('size=".1"', "-.6 0 .05"), heights=np.zeros((5, 7))))
     tops = {key[2]: top for key, top in zip(field.keys, field.tops) if key[1] == 0}
-    assert {number for number, top in tops.items() if not top.any()} == {n for n in tops if n % 2 and (n % 12 == 1 or n > 36)}
+    assert {number for number, top in tops.items() if not top.any()} == {
+        n for n in tops if n % 2 and (n % 12 == 1 or n > 36)
+    }
     assert all(top.tolist() in ([0, 0, 0], [0, 0, 1]) for top in tops.values())
 
 

@@ -76,23 +76,50 @@ def test_rows_of_an_array_are_frames_like_those_of_pybullet():
         _core.world_poses(rows[:, :6], which, *local)
 
 
-def test_chosen_frames_have_the_scalar_part_last():
+def test_chosen_frames_have_the_scalar_part_last_and_follow_edits():
     positions, quaternions = np.arange(6.0).reshape(2, 3), np.array([[1.0, 2, 3, 4], [5, 6, 7, 8]])
-    assert _core.chosen_frames(positions, quaternions, [1, 0]).tolist() == [
+    frames = _core.ChosenFrames(positions, quaternions, [1, 0])
+    assert frames.read().tolist() == [
         [3, 4, 5, 6, 7, 8, 5],
         [0, 1, 2, 2, 3, 4, 1],
     ]
+    positions[1, 0] = 9
+    assert frames.read()[0].tolist() == [9, 4, 5, 6, 7, 8, 5]
     with pytest.raises(ValueError, match="which must index the positions"):
-        _core.chosen_frames(positions, quaternions, [2])
+        _core.ChosenFrames(positions, quaternions, [2])
     with pytest.raises(ValueError, match="quaternions must have a row for each of `positions`"):
-        _core.chosen_frames(positions, quaternions[:1], [0])
+        _core.ChosenFrames(positions, quaternions[:1], [0])
+    with pytest.raises(ValueError, match="positions must be a contiguous array of doubles"):
+        _core.ChosenFrames(positions.astype(np.float32), quaternions, [0])
 
 
-def test_finite_within_refuses_far_positions_and_numbers_that_are_not_finite():
-    assert _core.finite_within([[1, -9, 0]], [[0, 0, 0, 99]], 10)
-    assert not _core.finite_within([[1, -10, 0]], [[0, 0, 0, 1]], 10)
-    assert not _core.finite_within([[np.nan, 0, 0]], [[0, 0, 0, 1]], 10)
-    assert not _core.finite_within([[0, 0, 0]], [[0, 0, np.inf, 1]], 10)
+def test_fixed_shapes_tell_whether_their_poses_are_usable():
+    shapes = _core.FixedShapes([0], np.zeros((1, 3)), np.array([AT_REST[1]], dtype=float))
+
+    def usable(*position, turn=(0.0, 0.0, 0.0, 1.0)):
+        return shapes.world(np.array([[*position, *turn]]), 10)[2]
+
+    assert usable(1, -9, 0)
+    assert not usable(1, -10, 0)
+    assert not usable(np.nan, 0, 0)
+    assert not usable(0, 0, 0, turn=(0, 0, np.inf, 1))
+
+
+def test_a_point_has_moved_if_a_coordinate_has_changed_by_more_than_its_slack():
+    turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    points, before = np.array([[1.0, 2, 3], [4, 5, 6]]), np.array([[2.0, -1, 3], [5, -4, 6]])
+    both = np.array([True, True])
+
+    def moved(points, slack, meets=both):
+        return _core.any_moved(points, np.zeros(3), turn, before, np.array(slack), meets)
+
+    assert not moved(points, [0.1, 0.1])
+    further = points + [[0, 0, 0], [0, 0.2, 0]]
+    assert moved(further, [0.1, 0.1]) and not moved(further, [0.1, 0.3])
+    assert not moved(further, [0.1, 0.1], np.array([True, False]))
+    assert moved(points * [[np.nan], [1]], [0.1, 0.1]) and not moved(points - 100, [np.inf, np.inf])
+    with pytest.raises(ValueError, match="positions must have a row in each array"):
+        moved(points[:1], [0.1, 0.1])
 
 
 def test_a_snapshot_notices_edits_of_any_type_once():

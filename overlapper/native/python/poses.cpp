@@ -36,68 +36,114 @@ std::vector<Frame> to_frames(nb::handle given) {
   return frames;
 }
 
-nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handle positions_given,
-                      nb::handle orientations_given) {
-  std::vector<Frame> frames = to_frames(frames_given);
-  for (Frame& frame : frames) {
-    if (zero(frame.orientation)) fail("frames", "must not have the zero quaternion");
-    frame.orientation = normalized(frame.orientation);
+/// Shapes that are fixed to moving frames.
+class FixedShapes {
+ public:
+  FixedShapes(nb::handle which_given, nb::handle positions_given, nb::handle orientations_given)
+      : which_(to_indices(which_given, "which")) {
+    const Doubles positions = to_doubles(positions_given, "positions", "an array of shape (k, 3)");
+    const Doubles orientations = to_doubles(orientations_given, "orientations", "an array of shape (k, 4)");
+    const size_t k = which_.size();
+    if (positions.ndim() != 2 || positions.shape(0) != k || positions.shape(1) != 3)
+      fail("positions", "must have the shape (k, 3), a row for each of `which`");
+    if (orientations.ndim() != 2 || orientations.shape(0) != k || orientations.shape(1) != 4)
+      fail("orientations", "must have the shape (k, 4), a row for each of `which`");
+    for (size_t i = 0; i < k; ++i) {
+      const double *p = positions.data() + 3 * i, *q = orientations.data() + 4 * i;
+      local_.push_back({{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}});
+      if (zero(local_.back().orientation)) fail("orientations", "must not have the zero quaternion");
+    }
   }
-  const std::vector<std::int64_t> which = to_indices(which_given, "which");
-  const Doubles local_positions = to_doubles(positions_given, "positions", "an array of shape (k, 3)");
-  const Doubles local_orientations = to_doubles(orientations_given, "orientations", "an array of shape (k, 4)");
-  const size_t k = which.size();
-  if (local_positions.ndim() != 2 || local_positions.shape(0) != k || local_positions.shape(1) != 3)
-    fail("positions", "must have the shape (k, 3), a row for each of `which`");
-  if (local_orientations.ndim() != 2 || local_orientations.shape(0) != k || local_orientations.shape(1) != 4)
-    fail("orientations", "must have the shape (k, 4), a row for each of `which`");
-  std::vector<double> positions(3 * k), orientations(4 * k);
-  for (size_t i = 0; i < k; ++i) {
-    if (which[i] < 0 || which[i] >= std::int64_t(frames.size())) fail("which", "must index the frames");
-    const Frame& frame = frames[which[i]];
-    const double *p = local_positions.data() + 3 * i, *q = local_orientations.data() + 4 * i;
-    const Vec3 x = frame.position + rotated(frame.orientation, {p[0], p[1], p[2]});
-    const Quaternion local{q[0], q[1], q[2], q[3]};
-    if (zero(local)) fail("orientations", "must not have the zero quaternion");
-    const Quaternion r = frame.orientation * local;
-    double *position = &positions[3 * i], *orientation = &orientations[4 * i];
-    position[0] = x.x, position[1] = x.y, position[2] = x.z;
-    orientation[0] = r.x, orientation[1] = r.y, orientation[2] = r.z, orientation[3] = r.w;
+
+  nb::tuple world(nb::handle frames_given, double farthest) const {
+    std::vector<Frame> frames = to_frames(frames_given);
+    for (Frame& frame : frames) {
+      if (zero(frame.orientation)) fail("frames", "must not have the zero quaternion");
+      frame.orientation = normalized(frame.orientation);
+    }
+    const size_t k = which_.size();
+    std::vector<double> positions(3 * k), orientations(4 * k);
+    bool within = true;
+    for (size_t i = 0; i < k; ++i) {
+      if (which_[i] < 0 || which_[i] >= std::int64_t(frames.size())) fail("which", "must index the frames");
+      const Frame& frame = frames[which_[i]];
+      const Vec3 x = frame.position + rotated(frame.orientation, local_[i].position);
+      const Quaternion r = frame.orientation * local_[i].orientation;
+      double *position = &positions[3 * i], *orientation = &orientations[4 * i];
+      position[0] = x.x, position[1] = x.y, position[2] = x.z;
+      orientation[0] = r.x, orientation[1] = r.y, orientation[2] = r.z, orientation[3] = r.w;
+      within = within && max_component(abs(x)) < farthest && finite(x) && finite(vector_part(r)) && std::isfinite(r.w);
+    }
+    return nb::make_tuple(to_numpy<Matrix>(std::move(positions), {k, 3}),
+                          to_numpy<Matrix>(std::move(orientations), {k, 4}), within);
   }
-  return nb::make_tuple(to_numpy<Matrix>(std::move(positions), {k, 3}),
-                        to_numpy<Matrix>(std::move(orientations), {k, 4}));
+
+ private:
+  std::vector<std::int64_t> which_;
+  std::vector<Frame> local_;
+};
+
+nb::tuple world_poses(nb::handle frames, nb::handle which, nb::handle positions, nb::handle orientations) {
+  const nb::tuple found = FixedShapes(which, positions, orientations).world(frames, 0);
+  return nb::make_tuple(found[0], found[1]);
 }
 
-const double* rows_of(const Doubles& array, const char* name, size_t columns) {
-  if (array.ndim() != 2 || array.shape(1) != columns)
-    fail(name, "must have the shape (n, " + std::to_string(columns) + "), not " + shape_text(array));
-  return array.data();
-}
-
-Matrix chosen_frames(nb::handle positions_given, nb::handle quaternions_given, nb::handle which_given) {
-  const Doubles positions = to_doubles(positions_given, "positions", "an array of shape (n, 3)");
-  const Doubles quaternions = to_doubles(quaternions_given, "quaternions", "an array of shape (n, 4)");
-  const std::vector<std::int64_t> which = to_indices(which_given, "which");
-  const double *p = rows_of(positions, "positions", 3), *q = rows_of(quaternions, "quaternions", 4);
-  const size_t n = positions.shape(0);
-  if (quaternions.shape(0) != n) fail("quaternions", "must have a row for each of `positions`");
-  std::vector<double> frames;
-  frames.reserve(7 * which.size());
-  for (std::int64_t i : which) {
-    if (i < 0 || i >= std::int64_t(n)) fail("which", "must index the positions");
-    const double *x = p + 3 * i, *wxyz = q + 4 * i;
-    frames.insert(frames.end(), {x[0], x[1], x[2], wxyz[1], wxyz[2], wxyz[3], wxyz[0]});
+/// Rows of arrays of poses that a simulator owns and changes.
+class ChosenFrames {
+ public:
+  ChosenFrames(nb::handle positions, nb::handle quaternions, nb::handle which_given)
+      : positions_(rows_of(positions, "positions", 3)),
+        quaternions_(rows_of(quaternions, "quaternions", 4)),
+        which_(to_indices(which_given, "which")) {
+    const size_t n = positions_.shape(0);
+    if (quaternions_.shape(0) != n) fail("quaternions", "must have a row for each of `positions`");
+    for (std::int64_t i : which_)
+      if (i < 0 || i >= std::int64_t(n)) fail("which", "must index the positions");
   }
-  return to_numpy<Matrix>(std::move(frames), {which.size(), 7});
-}
 
-bool finite_within(nb::handle positions_given, nb::handle orientations_given, double farthest) {
-  const Doubles positions = to_doubles(positions_given, "positions", "an array of numbers");
-  const Doubles orientations = to_doubles(orientations_given, "orientations", "an array of numbers");
-  return std::all_of(positions.data(), positions.data() + positions.size(),
-                     [&](double x) { return std::abs(x) < farthest; }) &&
-         std::all_of(orientations.data(), orientations.data() + orientations.size(),
-                     [](double x) { return std::isfinite(x); });
+  Matrix read() const {
+    std::vector<double> frames;
+    frames.reserve(7 * which_.size());
+    for (std::int64_t i : which_) {
+      const double *x = positions_.data() + 3 * i, *wxyz = quaternions_.data() + 4 * i;
+      frames.insert(frames.end(), {x[0], x[1], x[2], wxyz[1], wxyz[2], wxyz[3], wxyz[0]});
+    }
+    return to_numpy<Matrix>(std::move(frames), {which_.size(), 7});
+  }
+
+ private:
+  static Doubles rows_of(nb::handle given, const char* name, size_t columns) {
+    Doubles array;
+    if (!nb::ndarray_check(given) || !nb::try_cast(given, array, false) || array.ndim() != 2 ||
+        array.shape(1) != columns)
+      fail(name, "must be a contiguous array of doubles of shape (n, " + std::to_string(columns) + ")");
+    return array;
+  }
+
+  Doubles positions_, quaternions_;
+  std::vector<std::int64_t> which_;
+};
+
+/// Whether a point of `meets` has moved: the greatest coordinate of turn * (position - origin) - before exceeds its
+/// slack or is not a number.
+bool any_moved(nb::handle positions_given, nb::handle origin_given, nb::handle turn_given, nb::handle before_given,
+               nb::handle slack_given, nb::handle meets_given) {
+  const std::vector<Vec3> positions = to_rows(positions_given, "positions"), turn = to_rows(turn_given, "turn"),
+                          before = to_rows(before_given, "before");
+  const Vec3 origin = to_vec3(origin_given, "origin");
+  const Doubles slack = to_doubles(slack_given, "slack", "an array of numbers");
+  const auto meets = nb::cast<nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>>(meets_given, false);
+  const size_t n = positions.size();
+  if (turn.size() != 3) fail("turn", "must have three rows");
+  if (before.size() != n || slack.size() != n || meets.size() != n) fail("positions", "must have a row in each array");
+  for (size_t i = 0; i < n; ++i) {
+    if (!meets.data()[i]) continue;
+    const Vec3 x = positions[i] - origin, was = before[i];
+    const Vec3 moved = abs(Vec3{dot(turn[0], x) - was.x, dot(turn[1], x) - was.y, dot(turn[2], x) - was.z});
+    const double most = slack.data()[i];
+    if (!(moved.x <= most && moved.y <= most && moved.z <= most)) return true;
+  }
+  return false;
 }
 
 /// Copies of arrays, to notice when somebody edits the arrays.
@@ -176,14 +222,49 @@ void define_poses(nb::module_& m) {
 `frames` begin with position and quaternion, as pybullet's answers do, or they are rows (n, 7) of an array. Thing i is
 fixed to frame `which[i]` at `positions[i]` and `orientations[i]` of it. Quaternions are of any length but 0. Those in
 the world are as long as `orientations`. They are not finite where a frame is not.)");
-  m.def("chosen_frames", &chosen_frames, "positions"_a, "quaternions"_a, "which"_a,
-        nb::sig("def chosen_frames(positions: numpy.typing.ArrayLike, quaternions: numpy.typing.ArrayLike, which: "
-                "numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]"),
-        R"((k, 7) positions and quaternions xyzw in the rows `which`, for `world_poses`; `quaternions` are wxyz.)");
-  m.def("finite_within", &finite_within, "positions"_a, "orientations"_a, "farthest"_a,
-        nb::sig("def finite_within(positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, farthest: "
-                "float) -> bool"),
-        "Whether all numbers are finite, and those of the positions less than `farthest` in size.");
+  nb::class_<FixedShapes>(m, "FixedShapes", R"(Shapes that are fixed to moving frames.
+
+Parameters
+----------
+which : (k,) array_like of int
+    The row of each shape's frame.
+positions : (k, 3) array_like
+    In the frames, m.
+orientations : (k, 4) array_like
+    Quaternions xyzw in the frames.)")
+      .def(nb::init<nb::handle, nb::handle, nb::handle>(), "which"_a, "positions"_a, "orientations"_a,
+           nb::sig("def __init__(self, which: numpy.typing.ArrayLike, positions: numpy.typing.ArrayLike, orientations: "
+                   "numpy.typing.ArrayLike) -> None"))
+      .def(
+          "world", &FixedShapes::world, "frames"_a, "farthest"_a,
+          nb::sig("def world(self, frames: collections.abc.Sequence[typing.Any] | "
+                  "numpy.typing.NDArray[numpy.float64], farthest: float) -> tuple[numpy.typing.NDArray[numpy.float64], "
+                  "numpy.typing.NDArray[numpy.float64], bool]"),
+          R"(Positions and quaternions as of `world_poses`, and whether all of them are usable.
+
+Usable poses are finite, and their coordinates are less than `farthest` in size.)");
+  nb::class_<ChosenFrames>(m, "ChosenFrames", R"(Rows of arrays of poses that a simulator owns and changes.
+
+Parameters
+----------
+positions : (n, 3) ndarray
+    In m.
+quaternions : (n, 4) ndarray
+    In the order wxyz.
+which : (k,) array_like of int
+    The rows.)")
+      .def(nb::init<nb::handle, nb::handle, nb::handle>(), "positions"_a, "quaternions"_a, "which"_a,
+           nb::sig("def __init__(self, positions: numpy.typing.NDArray[numpy.float64], quaternions: "
+                   "numpy.typing.NDArray[numpy.float64], which: numpy.typing.ArrayLike) -> None"))
+      .def("read", &ChosenFrames::read, nb::sig("def read(self) -> numpy.typing.NDArray[numpy.float64]"),
+           "(k, 7) positions and quaternions xyzw of these rows now, for `FixedShapes.world`.");
+  m.def("any_moved", &any_moved, "positions"_a, "origin"_a, "turn"_a, "before"_a, "slack"_a, "meets"_a,
+        nb::sig("def any_moved(positions: numpy.typing.ArrayLike, origin: numpy.typing.ArrayLike, turn: "
+                "numpy.typing.ArrayLike, before: numpy.typing.ArrayLike, slack: numpy.typing.ArrayLike, meets: "
+                "numpy.typing.NDArray[numpy.bool_]) -> bool"),
+        R"(Whether one of the points in `meets` (n,) has moved by more than its `slack` (n,) along an axis.
+
+Coordinates are turn @ (position - origin). `before` (n, 3) are the earlier coordinates.)");
   nb::class_<Snapshot>(m, "Snapshot", R"(Copies of arrays of numpy, to notice edits.
 
 Parameters

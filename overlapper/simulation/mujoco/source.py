@@ -18,17 +18,20 @@ from overlapper.simulation.mujoco.silence import asked_flags
 from overlapper.simulation.mujoco.stepping import MujocoStepping
 from overlapper.simulation.source import Source
 
+UNPOSED = [[0.0, 0.0, 0.0, 0.0]]
+"""The quaternion of the first geom, as long as MuJoCo has not computed the poses of any geom."""
+
 
 class GeomPoses:
     """The poses of some geoms of `data`. MuJoCo's quaternions are wxyz."""
 
     def __init__(self, data: Any, colliders: Sequence[LinkKey]) -> None:
         self.colliders = colliders
-        self._positions, self._quaternions = data.geom_xpos, data.geom_xquat
-        self._geoms = np.array([geom for _, geom in colliders], dtype=np.int64)
+        geoms = np.array([geom for _, geom in colliders], dtype=np.int64)
+        self._frames = _core.ChosenFrames(data.geom_xpos, data.geom_xquat, geoms)
 
     def read(self) -> Array:
-        return _core.chosen_frames(self._positions, self._quaternions, self._geoms)
+        return self._frames.read()
 
 
 class MujocoSource(Source):
@@ -40,20 +43,20 @@ class MujocoSource(Source):
     def __init__(self, model: Any, data: Any, given_names: Mapping[int, str]) -> None:
         self._model, self._data, self._given_names = model, data, dict(given_names)
         self.bodies: dict[int, ModelledBody] = {}
-        self._quaternions = data.geom_xquat
+        self._first_turn = data.geom_xquat[:1]
         # The numbers of the model from which the bodies and the rules were read.
         self._drawn, self._in_force = _core.Snapshot(drawn_from(model)), _core.Snapshot(in_force(model))
         self._flags = -1
         self._was_read = False
         self._rule: tuple[object, Layout, PairRule] | None = None
-        self._flexes_told = self._filter_told = False
+        self._filter_told = False
 
     @property
     def time_step(self) -> float:
         return float(self._model.opt.timestep)
 
     def refresh(self) -> list[Skipped] | None:
-        if len(self._quaternions) and not self._quaternions.any():
+        if self._first_turn.tolist() == UNPOSED:
             raise ValueError("data has no poses yet: call mujoco.mj_forward(model, data) first")
         flags, other_flags = asked_flags(self._model), self._flags
         drawn, in_force = self._drawn.renew(), self._in_force.renew()

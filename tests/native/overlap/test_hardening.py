@@ -111,8 +111,9 @@ def answers(seed):
     found["rectangles"] = [_core.volumes_around(rectangles, rectangles, False, 2), rectangles.volume]
     found["volume_gradients"] = _core.volume_gradients(boxes, boxes, np.ones(3), True, TOLERANCE, 2)
     found["fit_boxes"] = _core.fit_boxes([[[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)]], "corners")
-    found["chosen_frames"] = _core.chosen_frames(positions, orientations, np.arange(3))
-    assert _core.finite_within(positions, orientations, 1e3)
+    found["ChosenFrames"] = _core.ChosenFrames(np.array(positions), np.array(orientations), np.arange(3)).read()
+    found["any_moved"] = _core.any_moved(positions, np.zeros(3), np.eye(3), positions, np.zeros(3), np.ones(3, bool))
+    found["FixedShapes"] = _core.FixedShapes(np.arange(3), positions, orientations).world(frames, 1e3)
     mask = _core.PairMask(np.arange(3), ~np.eye(3, dtype=bool))
     found["masked_overlaps"] = _core.masked_overlaps(Batch(shapes), positions, orientations, mask, TOLERANCE)
     rule = _core.WeldRule([[1, 1, k, k, 0, False, False] for k in range(3)], [], [], True, False)
