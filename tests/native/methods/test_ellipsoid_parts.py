@@ -198,3 +198,34 @@ def test_answers_do_not_depend_on_the_order():
         one, other = overlap(a, b), overlap(b, a)
         assert one.volume == other.volume
         assert np.array_equal(one.gradient[0], other.gradient[1])
+
+
+@pytest.mark.parametrize("away", [0.0, 0.15, 0.45])
+def test_meshes_of_more_facets_than_a_slice_can_have_are_cut_in_parts(away):
+    rng = np.random.default_rng(5)
+    points = rng.normal(size=(90, 3))
+    points *= np.array([0.5, 0.4, 0.6]) / np.linalg.norm(points, axis=1)[:, None]
+    for core in (Hull(points), Hull(points + [9e-3, 0, 0])):
+        assert len(core.facets) > 68
+        body = Placed(RoundedHull(core.vertices, 1e-3), (0.1, 0.2, 0.3), (1, 2, 3, 4))
+        at = body.position + away * np.array([0.6, 0, 0.8])
+        almost = Ellipsoid([0.45, 0.45, 0.45 * (1 + 4e-16)])  # measured as an ellipsoid, though it is a ball
+        found, truth = overlap(body, Placed(almost, at)), overlap(body, Placed(Sphere(0.45), at))
+        assert found.way == "slicing"
+        assert abs(found.volume - truth.volume) <= found.volume_error + truth.volume_error + 1e-15
+        assert found.volume_error <= 1e-11 * found.volume
+        assert np.allclose(found.centroid, truth.centroid, atol=1e-12)
+        assert found.area == pytest.approx(truth.area, rel=1e-9)
+        assert np.allclose(found.gradient, truth.gradient, atol=1e-10)
+
+
+def test_a_thin_ellipsoid_and_a_hull_of_many_facets_are_sliced_in_parts():
+    """The closed form loses digits there, and the slices of the whole would have too many walls."""
+    rng = np.random.default_rng(6)
+    points = rng.normal(size=(120, 3))
+    hull = Hull(points / np.linalg.norm(points, axis=1)[:, None])
+    inside = Placed(Ellipsoid([0.6, 0.5, 1e-9]), (0.01, 0.02, 0.03), (1, 2, 3, 4))
+    found = overlap(hull, inside)
+    assert found.volume == pytest.approx(4 / 3 * np.pi * 0.3e-9, rel=1e-12)
+    cut = overlap(hull, Placed(Ellipsoid([1.2, 1.3, 1e-8]), (0.1, 0.2, 0.3), (1, 2, 3, 4)))
+    assert "dual" not in cut.way and cut.volume_error <= 1e-11 * cut.volume

@@ -2,7 +2,6 @@
 
 #include "geometry/scratch.h"
 #include "methods/round/lenses/lenses.h"
-#include "methods/round/pieces/piece.h"
 #include "methods/round/pieces/stretched.h"
 
 namespace overlapper::lenses {
@@ -40,7 +39,7 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
   for (size_t i = 0; i < of_other.pieces.size(); ++i) {
     const int round = of_other.pieces[i].round;
     const std::span<const slicing::Wall> walls = of_other.of(static_cast<int>(i));
-    if (round < 0 ? !pieces::add_piece(of_ellipsoid.rounds, walls, nullptr, setting, sums)
+    if (round < 0 ? !pieces::add_ball_in_walls(of_ellipsoid.rounds, walls, setting, sums)
                   : !add_part(in, of_other.rounds[round], walls, sums))
       return std::nullopt;
   }

@@ -1,8 +1,12 @@
 #include "methods/round/pieces/stretched.h"
 
+#include <algorithm>
 #include <limits>
 
+#include "geometry/cancellation.h"
 #include "geometry/scratch.h"
+#include "methods/round/pieces/culling.h"
+#include "methods/round/pieces/parts.h"
 #include "methods/round/pieces/piece.h"
 
 namespace overlapper::pieces {
@@ -30,6 +34,48 @@ PatchView stretched_view(const PatchView& view, const Mat3& turn, const quadric:
   result.normal = stretch.normal(apply_transposed(turn, view.normal));
   result.u0 = view.u0 + dot(origin, result.u), result.v0 = view.v0 + dot(origin, result.v);
   return result;
+}
+
+namespace {
+
+struct PartsOfBall {
+  DistinctWalls distinct;
+  std::vector<Wall> walls;
+  std::vector<SlicedPart> parts;
+};
+
+/// Cuts a box around a ball with walls, and with planes that touch the ball beside the rest; false if nothing is left.
+bool enclose_in_walls(const Round& ball, std::span<const Wall> walls, EnclosingPolytope& around) {
+  const PlainRound plain(ball);
+  const double margin = 1e-12 * (plain.radius + norm(plain.centre));
+  const Vec3 reach = (plain.radius + margin) * Vec3{1, 1, 1};
+  around.become({plain.centre - reach, plain.centre + reach});
+  for (size_t w = 0; w < walls.size(); ++w) {
+    cancellation_point(around.corners.size());
+    if (!around.cut({rounded(walls[w].normal), walls[w].slack.head, static_cast<int>(w)})) return false;
+  }
+  for (int again = 0; again < 2; ++again) {
+    const Vec3 normal = plain.outward(around.middle());
+    if (normal != Vec3{} && !around.cut({normal, plain.reach(normal) + margin, kNoWall})) return false;
+  }
+  around.drop_faces();
+  return true;
+}
+
+}  // namespace
+
+bool add_ball_in_walls(std::span<const Round> ball, std::span<const Wall> walls, const PieceSetting& setting,
+                       Sums& sums) {
+  if (walls.size() <= slicing::kMostWalls) return add_piece(ball, walls, nullptr, setting, sums);
+  const Scratch<PartsOfBall> scratch;
+  auto& [distinct, with_cuts, parts] = *scratch;
+  parts.resize(1);
+  if (!enclose_in_walls(ball[0], walls, parts[0].polytope)) return true;
+  with_cuts.assign(walls.begin(), walls.end());
+  find_walls(distinct, with_cuts, parts[0]);
+  cut_in_parts(distinct, with_cuts, parts);
+  return std::ranges::all_of(
+      parts, [&](const SlicedPart& part) { return add_piece(ball, part.walls, &part.polytope, setting, sums); });
 }
 
 namespace {
@@ -63,7 +109,7 @@ BallSums best_of_ball(std::span<Round> rounds, std::vector<Wall>& walls, const S
       sums.patch = *pair.patch;
       setting.view = stretched_view(PatchView(*pair.patch, owner), turn, stretch, step);
     }
-    if (!add_piece(rounds, walls, nullptr, setting, sums)) break;
+    if (!add_ball_in_walls(rounds, walls, setting, sums)) break;
     const Totals& found = sums.totals;
     const double off = found.error + open_volume(found);
     if (!(found.volume > 0 && off < best.error)) break;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "methods/round/pieces/measure.h"
 #include "methods/round/pieces/pieces.h"
@@ -19,6 +20,11 @@ void into_ball(const Placed& ellipsoid, Vec3 half_axes, Pieces& pieces);
 
 /// The same view for a ball that is turned and stretched to the ellipsoid. Coordinates of the ball are about `origin`.
 PatchView stretched_view(const PatchView& view, const Mat3& turn, const quadric::Stretch& stretch, Vec3 origin);
+
+/// Adds the part of an ellipsoid's ball inside walls. The walls of a fine mesh are too many for slices: the ball is
+/// then cut in parts. False if slices give up.
+bool add_ball_in_walls(std::span<const Round> ball, std::span<const Wall> walls, const PieceSetting& setting,
+                       Sums& sums);
 
 /// The sums of the ball, and their errors.
 struct OfBall {

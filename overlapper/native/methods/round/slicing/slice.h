@@ -27,6 +27,7 @@ inline double cross(Point a, Point b) { return a.x * b.y - a.y * b.x; }
 
 /// The largest number of lines around a slice. Bodies with more planes, even after cuts, are measured in another way.
 inline constexpr int kMostLines = 72;
+inline constexpr size_t kMostWalls = kMostLines - 4;  ///< of a stack, which is inside a square
 
 /// A quadric in coordinates (x, y, t) about a point of the common set: a ball, or a cylinder with its axis in the
 /// slices. X = x l + y m + t T with T · n = 1, so t is the distance between slices, and T may be oblique. Seen along

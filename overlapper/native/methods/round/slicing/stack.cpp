@@ -255,7 +255,7 @@ std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall
 }
 
 std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way) {
-  if (walls.size() > static_cast<size_t>(kMostLines - 4)) return std::nullopt;
+  if (walls.size() > kMostWalls) return std::nullopt;
   const std::optional<Axes> chosen = axes_of(rounds, walls, way);
   if (!chosen) return std::nullopt;
   const Axes& axes = *chosen;
