@@ -1,6 +1,7 @@
 #include "methods/choose.h"
 
 #include <algorithm>
+#include <numeric>
 #include <stdexcept>
 
 #include "distance/gjk.h"
@@ -393,18 +394,19 @@ std::optional<MeasuresAndInertia> sliced_as_group(const OverlappingBodies& overl
   const Arrangement& at = overlapping.at;
   const pieces::SlicedGroup group = sliced_group(overlapping);
   const int bodies = static_cast<int>(at.order.size());
-  std::optional<MeasuresAndInertia> answer;
+  std::vector<int> all_but_last(bodies - 1);
+  std::iota(all_but_last.begin(), all_but_last.end(), 0);
+  const auto found = pieces::measure_group(group, all_but_last);
+  if (!found) return std::nullopt;
+  MeasuresAndInertia answer = by_slices(found->front(), at.reference);
   std::vector<Pull> pulls(bodies);
   for (int i = 0; i + 1 < bodies; ++i) {
-    const auto round = pieces::measure_group(group, i);
-    if (!round) return std::nullopt;
-    if (!answer) answer = by_slices(*round, at.reference);
-    pulls[i] = round->pull;
-    pulls.back() += {-round->pull.force, -round->pull.moment};
+    pulls[i] = (*found)[i].pull;
+    pulls.back() += {-pulls[i].force, -pulls[i].moment};
   }
-  answer->measures.pulls_of_group.resize(bodies);
+  answer.measures.pulls_of_group.resize(bodies);
   for (int i = 0; i < bodies; ++i)
-    answer->measures.pulls_of_group[at.order[i]] =
+    answer.measures.pulls_of_group[at.order[i]] =
         about(pulls[i], at.reference, overlapping.bodies[at.order[i]].position);
   return answer;
 }
@@ -421,10 +423,10 @@ Spread spread_between(const pieces::RoundMeasures& large, const pieces::RoundMea
 std::optional<Spread> spread_of_group(const OverlappingBodies& overlapping, double moved, double area_error) {
   const pieces::SlicedGroup group = sliced_group(overlapping);
   const auto between = [&](int first, int only) -> std::optional<Spread> {
-    const auto large = pieces::measure_group(group, first, {moved, only});
-    const auto small = pieces::measure_group(group, first, {-moved, only});
+    const auto large = pieces::measure_group(group, std::span(&first, 1), {moved, only});
+    const auto small = pieces::measure_group(group, std::span(&first, 1), {-moved, only});
     if (!large || !small) return std::nullopt;
-    return spread_between(*large, *small, area_error);
+    return spread_between(large->front(), small->front(), area_error);
   };
   std::optional<Spread> all = between(0, -1);
   for (int i = 0; all && i < static_cast<int>(group.bodies.size()); ++i) {

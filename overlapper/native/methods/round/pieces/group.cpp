@@ -16,7 +16,11 @@ namespace {
 struct CommonPart {
   std::vector<Round> rounds;
   std::vector<Wall> walls;
+  EnclosingPolytope around;  ///< within the walls, but for rounding
 };
+
+/// While parts are looked for, the owner of a surface is this number plus that of its body.
+constexpr int kFirstBody = slicing::kCut + 1;
 
 /// Whether the rounds are two balls, or two cylinders with parallel axes.
 bool alike(const Round& a, const Round& b) {
@@ -26,7 +30,7 @@ bool alike(const Round& a, const Round& b) {
 
 class GroupPieces {
  public:
-  bool become(const SlicedGroup& group, int first, const MovedOut& moved) {
+  bool become(const SlicedGroup& group, const MovedOut& moved) {
     const std::span<const Placed> bodies = group.bodies;
     std::vector<const Placed*> each;
     for (const Placed& body : bodies) each.push_back(&body);
@@ -35,7 +39,7 @@ class GroupPieces {
     for (size_t i = 0; i < bodies.size(); ++i) {
       const int body = static_cast<int>(i);
       of_body[i].clear();
-      pieces::cut(bodies[i], bodies[i == 0 ? 1 : 0], &around, body == first ? 0 : 1, group.reference, group.inside,
+      pieces::cut(bodies[i], bodies[i == 0 ? 1 : 0], &around, kFirstBody + body, group.reference, group.inside,
                   of_body[i]);
       if (moved.outwards != 0 && (moved.only < 0 || moved.only == body) && !grow(of_body[i], moved.outwards))
         return false;
@@ -48,19 +52,22 @@ class GroupPieces {
   bool find_parts(double margin) {
     margin_ = margin;
     parts_.clear();
+    find_boxes();
     if (!find_parts(0, around, {})) return false;
     std::ranges::stable_sort(parts_, {}, [](const CommonPart& part) { return part.rounds.size(); });
     return true;
   }
 
-  bool add_all(const PieceSetting& setting, Sums& sums) {
+  /// Adds all parts. Surfaces of the body `first` have the owner 0, and those of all other bodies have the owner 1.
+  bool add_all(int first, const PieceSetting& setting, Sums& sums) {
+    first_ = first;
     std::vector<const CommonPart*> rest;
     for (const CommonPart& part : parts_) {
       cancellation_point();
       if (!add_in_closed_form(part, setting, sums)) rest.push_back(&part);
     }
     for (const CommonPart* part : rest)
-      if (!add_in_closed_form(*part, setting, sums) && !add_sliced(*part, setting, sums)) return false;
+      if (!add_in_closed_form(*part, setting, sums) && !add_sliced(setting, sums)) return false;
     return sums.totals.volume > 0;
   }
 
@@ -68,6 +75,24 @@ class GroupPieces {
   EnclosingPolytope around;  ///< the common set
 
  private:
+  /// A piece of a body, and the box around its part of the common set's polytope.
+  struct Boxed {
+    int piece;
+    Bounds box;
+  };
+
+  void find_boxes() {
+    boxed_.resize(of_body.size());
+    for (size_t i = 0; i < of_body.size(); ++i) {
+      boxed_[i].clear();
+      for (int piece = 0; piece < static_cast<int>(of_body[i].pieces.size()); ++piece) {
+        cancellation_point(around.corners.size());
+        polytope_ = around;
+        if (cut(polytope_, of_body[i].of(piece))) boxed_[i].push_back({piece, polytope_.bounds()});
+      }
+    }
+  }
+
   bool find_parts(size_t body, const EnclosingPolytope& within, const CommonPart& before) {
     if (body == of_body.size()) {
       CommonPart part = before;
@@ -75,13 +100,14 @@ class GroupPieces {
       return separate(part, within);
     }
     const Pieces& pieces = of_body[body];
-    for (size_t i = 0; i < pieces.pieces.size(); ++i) {
-      cancellation_point(within.corners.size());
-      const std::span<const Wall> walls = pieces.of(static_cast<int>(i));
+    const Bounds room = within.bounds();
+    for (const auto& [i, box] : boxed_[body]) {
+      cancellation_point();
+      const Vec3 lower = max(room.lower, box.lower), upper = min(room.upper, box.upper);
+      if (!(lower.x <= upper.x && lower.y <= upper.y && lower.z <= upper.z)) continue;
       EnclosingPolytope left = within;
-      if (!cut(left, walls)) continue;
       CommonPart part = before;
-      part.walls.insert(part.walls.end(), walls.begin(), walls.end());
+      if (!cut(left, pieces.of(i), &part.walls)) continue;
       if (const int round = pieces.pieces[i].round; round >= 0) {
         if (PlainRound(pieces.rounds[round]).misses(left, left.middle(), margin_)) continue;
         part.rounds.push_back(pieces.rounds[round]);
@@ -91,9 +117,14 @@ class GroupPieces {
     return true;
   }
 
-  bool cut(EnclosingPolytope& polytope, std::span<const Wall> walls) const {
+  /// Cuts a polytope; false if nothing is left. Adds the walls that are not certainly beyond it to `met`.
+  bool cut(EnclosingPolytope& polytope, std::span<const Wall> walls, std::vector<Wall>* met = nullptr) const {
     return std::ranges::all_of(walls, [&](const Wall& wall) {
-      return polytope.cut({rounded(wall.normal), wall.slack.head + margin_, kNoWall});
+      const Vec3 normal = rounded(wall.normal);
+      const double slack = wall.slack.head;
+      if (met && polytope.range(normal).second < slack - margin_) return true;
+      if (met) met->push_back(wall);
+      return polytope.cut({normal, slack + margin_, kNoWall});
     });
   }
 
@@ -107,6 +138,8 @@ class GroupPieces {
     if (std::ranges::count(rounds, false, &Round::ball) > 2) return false;
     parts_.push_back(part);
     std::ranges::stable_partition(parts_.back().rounds, [](const Round& round) { return !round.ball; });
+    parts_.back().around = within;
+    parts_.back().around.drop_faces();
     return true;
   }
 
@@ -131,9 +164,18 @@ class GroupPieces {
     return true;
   }
 
+  /// Takes the rounds and walls of a part, with their owners.
+  void own(const CommonPart& part) {
+    rounds_ = part.rounds, walls_ = part.walls;
+    const auto set_owner = [&](auto& surface) {
+      if (surface.owner != slicing::kCut) surface.owner = surface.owner == kFirstBody + first_ ? 0 : 1;
+    };
+    std::ranges::for_each(rounds_, set_owner), std::ranges::for_each(walls_, set_owner);
+  }
+
   /// The polytope of a part; false if it is empty.
   bool find_polytope(const CommonPart& part) {
-    polytope_ = around;
+    polytope_ = part.around;
     for (size_t i = 0; i < part.walls.size(); ++i) {
       cancellation_point(polytope_.corners.size());
       const Wall& wall = part.walls[i];
@@ -145,30 +187,34 @@ class GroupPieces {
   /// True if the part is empty or was added.
   bool add_in_closed_form(const CommonPart& part, const PieceSetting& setting, Sums& sums) {
     if (!find_polytope(part)) return true;
-    distinct_.walls.assign(part.walls.begin(), part.walls.end());
+    own(part);
+    distinct_.walls = walls_;
     if (is_flat(distinct_.walls, setting, sums.totals.error)) return true;
     find_repeated(distinct_, setting, sums.totals.error);
-    const Round* round = part.rounds.empty() ? nullptr : &part.rounds[0];
-    const bool sliced = part.rounds.size() > 1 || (round && setting.closely && setting.layer == 0);
+    const Round* round = rounds_.empty() ? nullptr : &rounds_[0];
+    const bool sliced = rounds_.size() > 1 || (round && setting.closely && setting.layer == 0);
     if (!sliced && add_in_polytope(round, polytope_, distinct_, setting, sums)) return true;
     const Vec3 at = polytope_.middle();
-    return std::ranges::any_of(part.rounds,
+    return std::ranges::any_of(rounds_,
                                [&](const Round& each) { return PlainRound(each).misses(polytope_, at, margin_); });
   }
 
-  /// Adds a part by slices, in smaller parts whose walls suit slices; false if slices give up.
-  bool add_sliced(const CommonPart& part, const PieceSetting& setting, Sums& sums) {
-    std::vector<Wall> walls = part.walls;
+  /// Adds the part that was tried last by slices, in smaller parts whose walls suit slices; false if slices give up.
+  bool add_sliced(const PieceSetting& setting, Sums& sums) {
     small_.resize(1);
     std::swap(small_[0].polytope, polytope_);
-    find_walls(distinct_, walls, small_[0]);
-    if (!sliceable(small_[0].walls.size())) cut_in_parts(distinct_, walls, small_);
+    find_walls(distinct_, walls_, small_[0]);
+    if (!sliceable(small_[0].walls.size())) cut_in_parts(distinct_, walls_, small_);
     return std::ranges::all_of(small_, [&](const SlicedPart& small) {
-      return add_piece(part.rounds, small.walls, &small.polytope, setting, sums);
+      return add_piece(rounds_, small.walls, &small.polytope, setting, sums);
     });
   }
 
+  std::vector<std::vector<Boxed>> boxed_;  ///< per body
   std::vector<CommonPart> parts_;
+  int first_ = 0;  ///< the body with owner 0
+  std::vector<Round> rounds_;
+  std::vector<Wall> walls_;
   double margin_ = 0;  ///< m: for rounding
   EnclosingPolytope polytope_;
   DistinctWalls distinct_;
@@ -177,9 +223,10 @@ class GroupPieces {
 
 }  // namespace
 
-std::optional<RoundMeasures> measure_group(const SlicedGroup& group, int first, const MovedOut& moved) {
+std::optional<std::vector<RoundMeasures>> measure_group(const SlicedGroup& group, std::span<const int> firsts,
+                                                        const MovedOut& moved) {
   const Scratch<GroupPieces> pieces;
-  if (!pieces->become(group, first, moved)) return std::nullopt;
+  if (!pieces->become(group, moved)) return std::nullopt;
   const Vec3 inside = rounded(group.inside);
   PieceSetting setting;
   setting.extent = kInfinity;
@@ -189,13 +236,19 @@ std::optional<RoundMeasures> measure_group(const SlicedGroup& group, int first, 
     margin += norm(body.pose.translation);
   }
   setting.common = &pieces->around;
+  setting.many_walls = true;
   if (!pieces->find_parts(1e-12 * (margin + pieces->around.extent()))) return std::nullopt;
-  const std::optional<Sums> sums =
-      best_sums(setting, {}, [&](const PieceSetting& with, Sums& found) { return pieces->add_all(with, found); });
-  if (!sums) return std::nullopt;
   std::vector<const Pieces*> each;
   for (const Pieces& body : pieces->of_body) each.push_back(&body);
-  return measures_of(sums->totals, each, inside);
+  std::vector<RoundMeasures> answers;
+  for (const int first : firsts) {
+    const std::optional<Sums> sums = best_sums(
+        setting, {}, [&](const PieceSetting& with, Sums& found) { return pieces->add_all(first, with, found); });
+    auto answer = sums ? measures_of(sums->totals, each, inside) : std::nullopt;
+    if (!answer) return std::nullopt;
+    answers.push_back(std::move(*answer));
+  }
+  return answers;
 }
 
 }  // namespace overlapper::pieces

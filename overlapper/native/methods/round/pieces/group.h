@@ -20,11 +20,13 @@ struct MovedOut {
   int only = -1;        ///< the only body that is moved; -1 for all bodies
 };
 
-/// The measures of a group. `pull` and `first_area` are those of the body `first`; the others count as one body.
+/// The measures of a group, one for each of the bodies `firsts`. `pull` and `first_area` are those of this body; all
+/// others count as one body.
 ///
 /// Bodies are cut into pieces as for pairs. Where surfaces of two balls, or of two parallel cylinders, cross, a plane
-/// cuts the common set in two parts, and each round bounds one part alone (power diagram; Aurenhammer 1987). If a
-/// part has more than two cylinders after that, there is no value.
-std::optional<RoundMeasures> measure_group(const SlicedGroup& group, int first, const MovedOut& moved = {});
+/// cuts the common set in two parts, and each round bounds one part alone (power diagram; Aurenhammer 1987). If a part
+/// has more than two cylinders after that, there is no value.
+std::optional<std::vector<RoundMeasures>> measure_group(const SlicedGroup& group, std::span<const int> firsts,
+                                                        const MovedOut& moved = {});
 
 }  // namespace overlapper::pieces

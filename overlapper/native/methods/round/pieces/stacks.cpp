@@ -200,7 +200,7 @@ bool add_slices(const SlicedPiece& piece, const PieceSetting& setting, Sums& sum
   const Scratch<BestSum> scratch;
   BestSum& sum = *scratch;
   sum.best.integrals = {}, sum.open = std::numeric_limits<double>::infinity();
-  const bool told = look_at(*stack, setting.closely, sum.intervals);
+  const bool told = look_at(*stack, setting.closely || (setting.many_walls && stack->quadrics > 1), sum.intervals);
   if (told && sum.intervals.intervals.empty()) return true;
   if (told) {
     // With few nodes, the terms say too little about a stretched area.

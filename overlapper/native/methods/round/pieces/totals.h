@@ -102,6 +102,7 @@ struct PieceSetting {
   const EnclosingPolytope* common = nullptr;  ///< no piece lies outside of it
   PatchView view;                             ///< of the patch, if one is summed
   bool closely = false;                       ///< sample all of every interval
+  bool many_walls = false;                    ///< the same for two or more rounds: many planes meet their corners
   double sure = kSure;                        ///< negligible rounding of a polytope's corners, relative to the volume
   double layer = 0;                           ///< m: planes at most this far apart count as one
   double surface = 0;                         ///< m²: of the common set, if there are such layers
