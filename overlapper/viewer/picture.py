@@ -212,7 +212,7 @@ def _legend(scale: Scale) -> AnchoredOffsetbox:
     for k, color in enumerate(colors(np.arange(steps) / (steps - 1), 1.0)):
         ramp.add_artist(Rectangle((140 * k / steps, 0), 140 / steps + 0.5, 10, facecolor=color, linewidth=0))
     lines: list[Any] = [HPacker(children=[_text("0"), ramp, _text(scale.pressure)], pad=0, sep=8, align="center")]
-    for words, color in ((f"force, {scale}", FORCE), ("of it friction", FRICTION)):
+    for words, color in ((f"force, {scale}", FORCE), ("friction, part of it", FRICTION)):
         arrow = DrawingArea(26, 10)
         arrow.add_artist(Polygon([(0, 3.5), (15, 3.5), (15, 0), (26, 5), (15, 10), (15, 6.5), (0, 6.5)], color=color))
         lines.append(HPacker(children=[arrow, _text(words)], pad=0, sep=8, align="center"))

@@ -98,5 +98,4 @@ if (film.forces) {
   document.body.classList.add("forced");
   byId("ramp").style.background = `linear-gradient(90deg, ${film.forces.colors.join(", ")})`;
   byId("top").textContent = told(film.forces.top, pascals, 3);
-  document.querySelector("#legend summary").textContent = "What is what?";
 }
