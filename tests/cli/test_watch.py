@@ -74,22 +74,29 @@ def said(done):
     return re.sub(r"^pybullet build time.*\n", "", done.stderr, flags=re.MULTILINE)
 
 
+@pytest.fixture(scope="module")
+def run_of_scene(tmp_path_factory):
+    """The rows and the printed table of `overlapper run`."""
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "scene.py").write_text(SCENE)
+    done = run(*COMMAND, "run", folder / "scene.py", "--out", folder / "run.csv")
+    assert done.returncode == 0
+    return read_table(folder / "run.csv"), done.stdout.partition("at\npair")[2].partition("bodies,")[0]
+
+
 @pytest.mark.parametrize("way", WAYS_TO_STEP)
-def test_watch_writes_the_table_of_a_run_however_the_script_steps(way):
+def test_watch_writes_the_table_of_a_run_however_the_script_steps(way, run_of_scene):
     script(WAYS_TO_STEP[way])
-    Path("scene.py").write_text(SCENE)
+    rows, table = run_of_scene
     watched = watch("--out", "watched.csv", "script.py")
     assert (watched.returncode, watched.stdout) == (0, alone().stdout)
     assert "Overlaps of script.py in 20 steps, 0.0833 s" in watched.stderr
     assert "Written: watched.csv" in watched.stderr
-    done = run(*COMMAND, "run", "scene.py", "--out", "run.csv")
-    assert done.returncode == 0
-    assert len(read_table(Path("run.csv"))) >= 20
-    assert read_table(Path("watched.csv")) == read_table(Path("run.csv"))
-    assert sorted(path.name for path in Path().iterdir()) == ["run.csv", "scene.py", "script.py", "watched.csv"]
+    assert len(rows) >= 20
+    assert read_table(Path("watched.csv")) == rows
+    assert sorted(path.name for path in Path().iterdir()) == ["script.py", "watched.csv"]
     # But for the name, and Bullet's own numbers.
-    table = watched.stderr.partition("at\npair")[2].partition("bodies,")[0]
-    assert table == done.stdout.partition("at\npair")[2].partition("bodies,")[0]
+    assert watched.stderr.partition("at\npair")[2].partition("bodies,")[0] == table
     heading = read_metadata(Path("watched.csv"))
     assert heading.items() >= {"simulation": "script.py", "every": "1", "pairs": "simulated", "per": "shape"}.items()
 
