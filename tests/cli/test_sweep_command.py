@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from busy import slowness
+from command import overlapper
 from sweeping import BALLS, parts, rows
 
 
@@ -19,8 +21,7 @@ def balls(tmp_path, monkeypatch):
 
 
 def sweep(*arguments):
-    command = [sys.executable, "-m", "overlapper", "sweep", "balls.py", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+    return overlapper("sweep", "balls.py", *arguments)
 
 
 def test_a_sweep_prints_its_result_and_writes_a_page():
@@ -119,13 +120,17 @@ def test_a_sweep_with_nothing_to_compare_is_refused_before_it_begins():
 
 
 def test_without_a_limit_a_task_that_takes_very_long_is_named():
-    start = "import sys\nfrom overlapper.jobs import patience\nfrom overlapper.cli import main\npatience.LATE = 2\n"
-    words = ["sweep", "balls.py", "--grid", "seconds=0,6", "--workers", "1", "--out"]
+    late = 1.5 * slowness()  # s
+    seconds = round(3 * late, 1)
+    start = (
+        f"import sys\nfrom overlapper.jobs import patience\nfrom overlapper.cli import main\npatience.LATE = {late}\n"
+    )
+    words = ["sweep", "balls.py", "--grid", f"seconds=0,{seconds}", "--workers", "1", "--out"]
     command = [sys.executable, "-c", f"{start}sys.argv[1:] = {words!r} + sys.argv[1:]\nmain()"]
     done = subprocess.run([*command, "runs"], capture_output=True, text=True, timeout=120)
-    words = "apart=0.15, seed=0, fate=good, seconds=6.0 has run for 0 min; --limit ends such tasks"
+    words = f"apart=0.15, seed=0, fate=good, seconds={seconds} has run for 0 min; --limit ends such tasks"
     assert (done.returncode, " ".join(done.stderr.split())) == (0, words)
-    limited = subprocess.run([*command, "limited", "--limit", "60"], capture_output=True, text=True, timeout=120)
+    limited = subprocess.run([*command, "limited", "--limit", "600"], capture_output=True, text=True, timeout=120)
     assert (limited.returncode, limited.stderr) == (0, "")
 
 
