@@ -236,9 +236,18 @@ def _of_different(quadrics: list[Quadric], planes: tuple[Plane, ...], around: Fl
     polytope = below(planes, around)
     if polytope is None:
         return []
+    bounding = [each for each in quadrics if not _holds(each, polytope)]
+    if len(bounding) < len(quadrics):
+        return _of_different(bounding, planes, around)
     given = {id(plane) for plane in planes}
     kept = [facet.plane for facet in polytope.facets if id(facet.plane) in given]
     return [ByArcs([constraint(each) for each in (*quadrics, *kept)], around)]
+
+
+def _holds(quadric: Quadric, polytope: Polytope) -> bool:
+    """Whether a polytope is within a quadric, which then bounds nothing of it."""
+    function = constraint(quadric)
+    return all(function.value(corner) <= 0 for corner in polytope.corners)
 
 
 def _of_one(quadric: Quadric | None, planes: tuple[Plane, ...], around: Floats) -> list[Summand]:

@@ -111,12 +111,22 @@ def test_homothetic_ellipsoids_are_images_of_balls():
         (Ellipsoid([0.25, 0.375, 0.5]), RoundedHull(CORNERS, 0.25), lambda: arb.pi() / 16),
         (Capsule(0.25, 0.5), Ellipsoid([0.75, 0.75, 2.0]), lambda: arb.pi() * 5 / 96),
         (Cylinder(0.25, 0.5), Ellipsoid([0.75, 1.0, 2.0]), lambda: arb.pi() / 32),
+        (RoundedHull(CORNERS / 4, 0.125), Ellipsoid([0.75, 1.0, 2.0]), lambda: arb(5) / 16 + 5 * arb.pi() / 192),
     ],
 )
 def test_a_body_inside_of_another_has_its_own_volume(inner, outer, truth):
     found = bounds(Placed(inner, (0.03, 0.02, 0.01), TURN), Placed(outer, (0.02, 0.03, 0.0)))
     with ctx.workdps(60):
         assert holds(found, truth())
+
+
+def test_pieces_within_an_ellipsoid_are_proved_without_arcs():
+    rounded = Placed(RoundedHull(CORNERS / 4, 0.125), (0.3, 0.2, 0.1), TURN)
+    arcs = [
+        sum(isinstance(each, ByArcs) for each in Common(rounded, Placed(Ellipsoid(half)))._summands)
+        for half in ([0.7, 0.8, 0.9], [1.5, 1.2, 2.0])
+    ]
+    assert 0 < arcs[0] < 20 and arcs[1] == 0
 
 
 def test_a_ball_that_touches_an_ellipsoid_from_inside_is_inside():

@@ -39,8 +39,9 @@ SHAPES = {
 }
 MARGINS = {"rounded hull", "mesh with margin"}
 CLASSES = [pair for pair in combinations_with_replacement(SHAPES, 2) if pair != ("half-space", "half-space")]
-# There is no proof for a rounded hull and an ellipsoid.
-PROVED = [(a, b) for a, b in CLASSES if not ("ellipsoid" in (a, b) and {a, b} & MARGINS)]
+# Pairs of a class, fewer where a proof takes seconds.
+COUNTS = {kinds: 2 if MARGINS.issuperset(kinds) else 4 for kinds in CLASSES}
+COUNTS |= {("ellipsoid", "rounded hull"): 2, ("ellipsoid", "mesh with margin"): 1}
 
 
 def seen_from_far(a, b, rng):
@@ -84,20 +85,15 @@ def proved_far_from(found):
     return float(max(lower - volume - error, volume - error - upper) / volume)
 
 
-@pytest.mark.parametrize("kinds", PROVED, ids=" and ".join)
+@pytest.mark.parametrize("kinds", CLASSES, ids=" and ".join)
 def test_stated_errors_hold_at_far_places(kinds):
     measured = 0
-    for a, b in far_pairs(kinds, 2026, 2 if MARGINS.issuperset(kinds) else 4):
+    for a, b in far_pairs(kinds, 2026, COUNTS[kinds]):
         found = overlap(a, b, tolerance=0.1)
         if found:
             measured += 1
             assert proved_far_from(found) <= 0, (a, b)
     assert measured > 0
-
-
-def test_all_classes_of_the_page_have_a_proof_or_are_known_to_have_none():
-    assert len(CLASSES) == 44
-    assert set(CLASSES) - set(PROVED) == {("ellipsoid", kind) for kind in MARGINS}
 
 
 # A cap so shallow that its plane is as uncertain, in double-double at that distance, as a part of 1e-14 of the volume.
