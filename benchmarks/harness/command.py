@@ -23,6 +23,7 @@ COMMANDS = {
     "mujoco": "speed.engine",
     "stability": "stability.hard_cases",
     "stress": "stability.stress",
+    "graded": "stability.graded",
     "physics": "forces.physics",
     "forces": "forces.cost",
     "firsttry": "forces.firsttry",

@@ -11,7 +11,7 @@ benchmarks/results for the stability page. The command fails if a rule is broken
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from itertools import count as counting
@@ -32,7 +32,8 @@ from harness.watched import Watched
 
 ROWS, TABLE = ROOT / "out" / "stress.csv", results.FOLDER / "stress.csv"
 
-TIME_LIMIT = 120.0  # s, for a case with its exact truth and its proof
+# s, for a case with its exact truth and its proof: of the processor, and by the clock of a busy machine
+TIME_LIMIT, PATIENCE = 120.0, 1200.0
 
 # Only every so many seeds of a family whose exact truth or proof takes seconds.
 EVERY = {
@@ -52,6 +53,7 @@ COLUMNS = ("family", "seed", "detail", "parameter", "common", "status", "widened
 
 Job = tuple[str, int]
 Row = dict[str, Any]
+Judge = Callable[[str, int], Row]
 
 
 def jobs(first: int, names: Iterable[str] = ()) -> Iterator[Job]:
@@ -82,13 +84,13 @@ def judged(family: str, seed: int) -> Row:
 # Cases in watched processes
 
 
-def rows(wanted: Iterable[Job], workers: int) -> Iterator[Row]:
-    """In the order in which they are finished."""
+def rows(wanted: Iterable[Job], workers: int, judge: Judge, first: Job) -> Iterator[Row]:
+    """In the order in which they are finished. `first` is asked before the time counts."""
     waiting, finished = iter(wanted), SimpleQueue[Row | None]()
     todo: SimpleQueue[Job | None] = SimpleQueue()
 
     def work() -> None:
-        with Watched(judged, TIME_LIMIT, ("general", 0)) as watched:
+        with Watched(judge, TIME_LIMIT, first, PATIENCE) as watched:
             while (job := todo.get()) is not None:
                 answer = watched.ask(*job)
                 row = answer if isinstance(answer, dict) else {"broken": answer}
@@ -109,12 +111,19 @@ def rows(wanted: Iterable[Job], workers: int) -> Iterator[Row]:
                 yield row
 
 
-def run(wanted: Iterable[Job], workers: int, path: Path) -> list[Row]:
+def run(
+    wanted: Iterable[Job],
+    workers: int,
+    path: Path,
+    judge: Judge = judged,
+    first: Job = ("general", 0),
+    columns: Sequence[str] = COLUMNS,
+) -> list[Row]:
     done = []
     path.parent.mkdir(parents=True, exist_ok=True)
-    with results.writing(path, COLUMNS) as write:
-        for row in rows(wanted, workers):
-            write([[row.get(column, "") for column in COLUMNS]])
+    with results.writing(path, columns) as write:
+        for row in rows(wanted, workers, judge, first):
+            write([[row.get(column, "") for column in columns]])
             done.append(row)
             if row["broken"]:
                 print(f"{row['family']} {row['seed']}: {row['broken']}", flush=True)
