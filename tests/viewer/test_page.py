@@ -253,7 +253,7 @@ def test_a_page_that_was_cut_says_so(browser, reach, tmp_path):
         page.write_text(broken, encoding="utf-8")
         browser.open(page.as_uri(), until="document.readyState === 'complete'")
         browser.ask("new Promise(done => setTimeout(done, 300))")
-        assert "it is not whole: it was cut or changed" in browser.ask(shown)
+        assert "the file is not complete: it was cut or changed" in browser.ask(shown)
 
 
 def test_a_page_carries_the_licences_of_what_it_contains(reach):
