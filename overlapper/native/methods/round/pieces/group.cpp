@@ -1,6 +1,7 @@
 #include "methods/round/pieces/group.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "geometry/cancellation.h"
 #include "geometry/scratch.h"
@@ -97,7 +98,7 @@ class GroupPieces {
     if (body == of_body.size()) {
       CommonPart part = before;
       std::erase_if(part.rounds, [&](const Round& round) { return PlainRound(round).contains(within, margin_); });
-      return separate(part, within);
+      return separate(std::move(part), within);
     }
     const Pieces& pieces = of_body[body];
     const Bounds room = within.bounds();
@@ -129,39 +130,41 @@ class GroupPieces {
   }
 
   /// Separates rounds that are alike, until a part has at most one ball and no parallel cylinders.
-  bool separate(const CommonPart& part, const EnclosingPolytope& within) {
-    const std::vector<Round>& rounds = part.rounds;
-    for (size_t i = 0; i < rounds.size(); ++i)
-      for (size_t j = i + 1; j < rounds.size(); ++j)
-        if (alike(rounds[i], rounds[j])) return separate(part, i, j, within);
+  bool separate(CommonPart part, const EnclosingPolytope& within) {
+    for (size_t i = 0; i < part.rounds.size(); ++i) {
+      const auto is_alike = [&, one = part.rounds[i]](const Round& round) { return alike(one, round); };
+      if (std::ranges::count_if(part.rounds, is_alike) < 2) continue;
+      std::vector<Round> group;
+      std::ranges::copy_if(part.rounds, std::back_inserter(group), is_alike);
+      std::erase_if(part.rounds, is_alike);
+      for (size_t each = 0; each < group.size(); ++each)
+        if (!separate(part, group, each, within)) return false;
+      return true;
+    }
     // Slices are parallel to at most two axes that are not parallel to each other.
-    if (std::ranges::count(rounds, false, &Round::ball) > 2) return false;
-    parts_.push_back(part);
-    std::ranges::stable_partition(parts_.back().rounds, [](const Round& round) { return !round.ball; });
+    if (std::ranges::count(part.rounds, false, &Round::ball) > 2) return false;
+    std::ranges::stable_partition(part.rounds, [](const Round& round) { return !round.ball; });
+    parts_.push_back(std::move(part));
     parts_.back().around = within;
     parts_.back().around.drop_faces();
     return true;
   }
 
-  bool separate(const CommonPart& part, size_t i, size_t j, const EnclosingPolytope& within) {
-    const Round &a = part.rounds[i], &b = part.rounds[j];
-    const auto without = [&](size_t gone) {
-      CommonPart left = part;
-      left.rounds.erase(left.rounds.begin() + static_cast<std::ptrdiff_t>(gone));
-      return left;
-    };
-    const std::optional<Wall> wall = radical_plane(a, b);
-    if (!wall) return separate(without(a.radius < b.radius ? j : i), within);
-    for (const bool first : {true, false}) {
-      const Wall side = first ? *wall : Wall{-wall->normal, -wall->slack, slicing::kCut};
-      EnclosingPolytope left = within;
-      if (!cut(left, std::span(&side, 1))) continue;
-      CommonPart half = without(first ? j : i);
-      half.walls.push_back(side);
-      if (PlainRound(first ? a : b).misses(left, left.middle(), margin_)) continue;
-      if (!separate(half, left)) return false;
+  /// Adds the part that one round of a group bounds: the part where the round is the nearest of the group, by power.
+  bool separate(CommonPart part, std::span<const Round> group, size_t one, EnclosingPolytope within) {
+    for (size_t other = 0; other < group.size(); ++other) {
+      if (other == one) continue;
+      const std::optional<Wall> wall = radical_plane(group[one], group[other]);
+      // The larger of two rounds contains the smaller one, and bounds nothing. Of two equal rounds, the first counts.
+      const double larger = group[one].radius - group[other].radius;
+      if (!wall && (larger > 0 || (larger == 0 && other < one))) return true;
+      if (!wall) continue;
+      if (!cut(within, std::span(&*wall, 1))) return true;
+      part.walls.push_back(*wall);
     }
-    return true;
+    if (PlainRound(group[one]).misses(within, within.middle(), margin_)) return true;
+    part.rounds.push_back(group[one]);
+    return separate(std::move(part), within);
   }
 
   /// Takes the rounds and walls of a part, with their owners.
