@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "geometry/cancellation.h"
+#include "geometry/constants.h"
 #include "geometry/scratch.h"
 #include "methods/round/pieces/best_sums.h"
 #include "methods/round/pieces/culling.h"
@@ -143,7 +144,7 @@ class GroupPieces {
     }
     // Slices are parallel to at most two axes that are not parallel to each other.
     if (std::ranges::count(part.rounds, false, &Round::ball) > 2) return false;
-    std::ranges::stable_partition(part.rounds, [](const Round& round) { return !round.ball; });
+    std::stable_partition(part.rounds.begin(), part.rounds.end(), [](const Round& round) { return !round.ball; });
     parts_.push_back(std::move(part));
     parts_.back().around = within;
     parts_.back().around.drop_faces();

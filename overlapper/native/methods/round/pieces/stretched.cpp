@@ -8,6 +8,7 @@
 #include "methods/round/pieces/culling.h"
 #include "methods/round/pieces/parts.h"
 #include "methods/round/pieces/piece.h"
+#include "methods/round/slicing/slice.h"
 
 namespace overlapper::pieces {
 

@@ -1,6 +1,7 @@
 #include "methods/round/slicing/breakpoints.h"
 
 #include <algorithm>
+#include <cfloat>
 #include <limits>
 #include <numbers>
 
@@ -456,10 +457,13 @@ class Settling {
       return true;
     }
     if (!closely_ && !(low < inside_ && inside_ < high)) return true;
+    // The slice at the very end of a cylinder has no width, so rounding decides whether its outline is empty.
+    const double least = 4 * DBL_EPSILON * std::max(std::abs(low), std::abs(high));
+    const double beside = std::min(std::max(beside_ * width, least), width / (2 * inner_));
     std::array<double, kMostInner + 2> t;
-    t[0] = low + beside_ * width;
+    t[0] = low + beside;
     for (int i = 1; i < inner_; ++i) t[i] = low + width * i / inner_;
-    t[inner_] = high - beside_ * width;
+    t[inner_] = high - beside;
     int samples = inner_ + 1;
     if (t[0] < inside_ && inside_ < t[inner_]) {
       t[samples++] = inside_;
