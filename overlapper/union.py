@@ -210,5 +210,5 @@ def _cells(
 
 def _volume_within(whole: Overlap) -> float:
     """The volume within the faces of an overlap, in m³."""
-    a, b, c = np.moveaxis(np.asarray(whole.vertices)[np.asarray(whole.faces)] - whole.centroid, 1, 0)
+    a, b, c = np.moveaxis(whole.vertices[whole.faces] - np.asarray(whole.centroid), 1, 0)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
