@@ -9,7 +9,8 @@ namespace overlapper {
 
 using IndexPair = std::array<int, 2>;
 
-/// MuJoCo's rule of which geoms may collide; see mj_collision in engine_collision_driver.c. Geoms have indices from 0.
+/// MuJoCo's rule about pairs of geoms that may collide: mj_collision in engine_collision_driver.c. Geoms have indices
+/// from 0.
 struct WeldRule {
   struct Geom {
     int type_mask, affinity;  ///< one geom's `type_mask` and the other's `affinity` must have a common bit

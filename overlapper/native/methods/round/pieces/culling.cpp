@@ -187,10 +187,4 @@ bool Culling::share(const Meeting& meeting, EnclosingPolytope& polytope) const {
   return true;
 }
 
-bool Culling::outside(const EnclosingPolytope& polytope, const Meeting& meeting) const {
-  const Vec3 middle = polytope.middle();
-  return a_.parts[meeting.p].round.misses(polytope, middle, margin_) ||
-         b_.parts[meeting.q].round.misses(polytope, middle, margin_);
-}
-
 }  // namespace overlapper::pieces

@@ -47,8 +47,7 @@ class Culling {
   /// number of its wall among `meeting.walls`, or kNoWall.
   bool share(const Meeting& meeting, EnclosingPolytope& polytope) const;
 
-  /// Whether that polytope lies outside one of the rounds.
-  bool outside(const EnclosingPolytope& polytope, const Meeting& meeting) const;
+  double margin() const { return margin_; }
 
  private:
   struct EnclosedPiece {

@@ -8,13 +8,13 @@
 #include "geometry/scratch.h"
 #include "methods/round/pieces/best_sums.h"
 #include "methods/round/pieces/culling.h"
-#include "methods/round/pieces/parts.h"
+#include "methods/round/pieces/enclosed_part.h"
 #include "methods/round/pieces/piece.h"
 
 namespace overlapper::pieces {
 namespace {
 
-/// The common part of one piece of each body.
+/// What one piece of each body leaves of the common set, with owners by kFirstBody.
 struct CommonPart {
   std::vector<Round> rounds;
   std::vector<Wall> walls;
@@ -69,7 +69,7 @@ class GroupPieces {
       if (!add_in_closed_form(part, setting, sums)) rest.push_back(&part);
     }
     for (const CommonPart* part : rest)
-      if (!add_in_closed_form(*part, setting, sums) && !add_sliced(setting, sums)) return false;
+      if (!add_in_closed_form(*part, setting, sums) && !part_.add_sliced(setting, sums)) return false;
     return sums.totals.volume > 0;
   }
 
@@ -89,8 +89,8 @@ class GroupPieces {
       boxed_[i].clear();
       for (int piece = 0; piece < static_cast<int>(of_body[i].pieces.size()); ++piece) {
         cancellation_point(around.corners.size());
-        polytope_ = around;
-        if (cut(polytope_, of_body[i].of(piece))) boxed_[i].push_back({piece, polytope_.bounds()});
+        EnclosingPolytope left = around;
+        if (cut(left, of_body[i].of(piece))) boxed_[i].push_back({piece, left.bounds()});
       }
     }
   }
@@ -156,7 +156,7 @@ class GroupPieces {
     for (size_t other = 0; other < group.size(); ++other) {
       if (other == one) continue;
       const std::optional<Wall> wall = radical_plane(group[one], group[other]);
-      // The larger of two rounds contains the smaller one, and bounds nothing. Of two equal rounds, the first counts.
+      // The larger of two rounds contains the smaller one, and bounds nothing. If both are equal, the first one counts.
       const double larger = group[one].radius - group[other].radius;
       if (!wall && (larger > 0 || (larger == 0 && other < one))) return true;
       if (!wall) continue;
@@ -168,61 +168,27 @@ class GroupPieces {
     return separate(std::move(part), within);
   }
 
-  /// Takes the rounds and walls of a part, with their owners.
-  void own(const CommonPart& part) {
-    rounds_ = part.rounds, walls_ = part.walls;
+  /// True if the part is empty or was added. Its surfaces get their owners.
+  bool add_in_closed_form(const CommonPart& part, const PieceSetting& setting, Sums& sums) {
+    part_.polytope = part.around;
+    for (size_t i = 0; i < part.walls.size(); ++i) {
+      cancellation_point(part_.polytope.corners.size());
+      const Wall& wall = part.walls[i];
+      if (!part_.polytope.cut({rounded(wall.normal), wall.slack.head, static_cast<int>(i)})) return true;
+    }
+    part_.rounds = part.rounds, part_.walls = part.walls;
     const auto set_owner = [&](auto& surface) {
       if (surface.owner != slicing::kCut) surface.owner = surface.owner == kFirstBody + first_ ? 0 : 1;
     };
-    std::ranges::for_each(rounds_, set_owner), std::ranges::for_each(walls_, set_owner);
-  }
-
-  /// The polytope of a part; false if it is empty.
-  bool find_polytope(const CommonPart& part) {
-    polytope_ = part.around;
-    for (size_t i = 0; i < part.walls.size(); ++i) {
-      cancellation_point(polytope_.corners.size());
-      const Wall& wall = part.walls[i];
-      if (!polytope_.cut({rounded(wall.normal), wall.slack.head, static_cast<int>(i)})) return false;
-    }
-    return true;
-  }
-
-  /// True if the part is empty or was added.
-  bool add_in_closed_form(const CommonPart& part, const PieceSetting& setting, Sums& sums) {
-    if (!find_polytope(part)) return true;
-    own(part);
-    distinct_.walls = walls_;
-    if (is_flat(distinct_.walls, setting, sums.totals.error)) return true;
-    find_repeated(distinct_, setting, sums.totals.error);
-    const Round* round = rounds_.empty() ? nullptr : &rounds_[0];
-    const bool sliced = rounds_.size() > 1 || (round && setting.closely && setting.layer == 0);
-    if (!sliced && add_in_polytope(round, polytope_, distinct_, setting, sums)) return true;
-    const Vec3 at = polytope_.middle();
-    return std::ranges::any_of(rounds_,
-                               [&](const Round& each) { return PlainRound(each).misses(polytope_, at, margin_); });
-  }
-
-  /// Adds the part that was tried last by slices, in smaller parts whose walls suit slices; false if slices give up.
-  bool add_sliced(const PieceSetting& setting, Sums& sums) {
-    small_.resize(1);
-    std::swap(small_[0].polytope, polytope_);
-    find_walls(distinct_, walls_, small_[0]);
-    if (!sliceable(small_[0].walls.size())) cut_in_parts(distinct_, walls_, small_);
-    return std::ranges::all_of(small_, [&](const SlicedPart& small) {
-      return add_piece(rounds_, small.walls, &small.polytope, setting, sums);
-    });
+    std::ranges::for_each(part_.rounds, set_owner), std::ranges::for_each(part_.walls, set_owner);
+    return part_.add_in_closed_form(margin_, setting, sums);
   }
 
   std::vector<std::vector<Boxed>> boxed_;  ///< per body
   std::vector<CommonPart> parts_;
-  int first_ = 0;  ///< the body with owner 0
-  std::vector<Round> rounds_;
-  std::vector<Wall> walls_;
+  int first_ = 0;      ///< the body with owner 0
   double margin_ = 0;  ///< m: for rounding
-  EnclosingPolytope polytope_;
-  DistinctWalls distinct_;
-  std::vector<SlicedPart> small_;
+  EnclosedPart part_;  ///< the part that was tried last
 };
 
 }  // namespace

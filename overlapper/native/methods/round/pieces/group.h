@@ -23,9 +23,9 @@ struct MovedOut {
 /// The measures of a group, one for each of the bodies `firsts`. `pull` and `first_area` are those of this body; all
 /// others count as one body.
 ///
-/// Bodies are cut into pieces as for pairs. Where surfaces of two balls, or of two parallel cylinders, cross, a plane
-/// cuts the common set in two parts, and each round bounds one part alone (power diagram; Aurenhammer 1987). If a part
-/// has more than two cylinders after that, there is no value.
+/// Bodies are cut into pieces as for pairs. A plane separates the parts that two balls bound, and the parts that two
+/// parallel cylinders bound (power diagram; Aurenhammer 1987). If a part has more than two cylinders after that, there
+/// is no value.
 std::optional<std::vector<RoundMeasures>> measure_group(const SlicedGroup& group, std::span<const int> firsts,
                                                         const MovedOut& moved = {});
 

@@ -9,8 +9,8 @@
 #include "geometry/scratch.h"
 #include "methods/round/pieces/best_sums.h"
 #include "methods/round/pieces/culling.h"
+#include "methods/round/pieces/enclosed_part.h"
 #include "methods/round/pieces/mitred.h"
-#include "methods/round/pieces/parts.h"
 #include "methods/round/pieces/piece.h"
 
 namespace overlapper::pieces {
@@ -136,48 +136,28 @@ struct ManyPieces {
       }
     // A piece that was too inaccurate relative to the pieces before it may be accurate enough relative to all.
     for (const auto& [i, j] : rest_)
-      if (meet(i, j) && !add_in_closed_form(setting, sums) && !add_sliced(setting, sums)) return false;
+      if (meet(i, j) && !add_in_closed_form(setting, sums) && !part_.add_sliced(setting, sums)) return false;
     return sums.totals.volume > 0;
   }
 
  private:
   /// Fills in the data of two pieces; false if their common part is empty.
   bool meet(int i, int j) {
-    both.get_rounds(i, j, rounds_);
+    both.get_rounds(i, j, part_.rounds);
     return culling.meet(i, j, meeting_);
   }
 
   /// True if the common part is empty or was added.
   bool add_in_closed_form(const PieceSetting& setting, Sums& sums) {
-    if (!culling.share(meeting_, polytope_)) return true;
-    distinct_.walls.assign(meeting_.walls.begin(), meeting_.walls.end());
-    if (is_flat(distinct_.walls, setting, sums.totals.error)) return true;
-    find_repeated(distinct_, setting, sums.totals.error);
-    // If the surface of the whole does not close, slices also measure the round pieces, until nearby planes count as
-    // one.
-    const Round* round = rounds_.empty() ? nullptr : &rounds_[0];
-    const bool sliced = rounds_.size() > 1 || (round && setting.closely && setting.layer == 0);
-    if (!sliced && add_in_polytope(round, polytope_, distinct_, setting, sums)) return true;
-    return culling.outside(polytope_, meeting_);
-  }
-
-  /// Adds a piece by slices, in parts whose walls suit slices; false if slices give up.
-  bool add_sliced(const PieceSetting& setting, Sums& sums) {
-    parts_.resize(1);
-    std::swap(parts_[0].polytope, polytope_);
-    find_walls(distinct_, meeting_.walls, parts_[0]);
-    if (!sliceable(parts_[0].walls.size())) cut_in_parts(distinct_, meeting_.walls, parts_);
-    return std::ranges::all_of(
-        parts_, [&](const SlicedPart& part) { return add_piece(rounds_, part.walls, &part.polytope, setting, sums); });
+    if (!culling.share(meeting_, part_.polytope)) return true;
+    part_.walls.swap(meeting_.walls);
+    return part_.add_in_closed_form(culling.margin(), setting, sums);
   }
 
   std::vector<Numbers> rest_;  ///< not measured in closed form
   // For the two pieces that meet.
-  std::vector<Round> rounds_;
   Culling::Meeting meeting_;
-  EnclosingPolytope polytope_;  ///< around their common part
-  DistinctWalls distinct_;
-  std::vector<SlicedPart> parts_;
+  EnclosedPart part_;  ///< their common part
 };
 
 struct MitredPieces {

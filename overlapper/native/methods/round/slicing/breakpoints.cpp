@@ -57,9 +57,9 @@ class Candidates {
     });
   }
 
-  /// Collects the values between low and high where the corner of two sides of cylinders meets a plane or the ball, and
-  /// where the corner of a side and a plane meets the ball. False position finds them between two samples on either
-  /// side.
+  /// Collects the values between low and high where a corner meets another surface. The corner of two sides of
+  /// cylinders may meet a plane or the ball. The corner of a side and a plane may meet the ball. False position finds
+  /// these values between two samples on either side.
   void trace(double low, double high) {
     bool crossing = false;
     for_pairs([&](const Quadric& p, const Quadric& q) { crossing = crossing || p.ball || q.ball || !parallel(p, q); });
