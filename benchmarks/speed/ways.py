@@ -5,7 +5,7 @@
 
 Each is asked for its status and volume, anew in every call and on one thread. A round takes the median of some calls'
 times, of the processor, so that other processes do not count; a figure is the least median of all rounds. Beside it, in
-the same rounds: the same bodies by the dual hull, which one more body brings about, a rounded hull around all others;
+the same rounds: the same bodies by the dual hull, which one more body brings about, an ellipsoid around all others;
 and by the article's method.
 """
 

@@ -18,7 +18,6 @@ from itertools import combinations_with_replacement
 from zlib import crc32
 
 import numpy as np
-from families import CORNERS
 from strategies import directions, rotation
 
 from overlapper import (
@@ -384,8 +383,11 @@ def measure_complaints(a: Placed, b: Placed, found: Overlap) -> Iterator[str]:
     if not (np.abs(gradient[0, :3] + gradient[1, :3]) <= errors.gradient[:, :3].sum(0) + 1e-15 * found.area).all():
         yield "the forces are not opposite"
     reach = max(width(body) for body in (a, b) if not isinstance(body.shape, HalfSpace))
-    around = Placed(RoundedHull(8 * reach * CORNERS, reach), found.centroid)
+    # Groups with an ellipsoid are measured by the dual hull alone.
+    around = Placed(Ellipsoid([8 * reach, 9 * reach, 10 * reach]), found.centroid)
     other = overlap(a, b, around, tolerance=1e-2)
+    if other and "dual hull" not in other.way:
+        yield f"with a body around both, the way is {other.way}"
     if not other:
         yield f"with a body around both, the status is {other.status}"
         return
