@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper._core import Box, HalfSpace, Overlap, Placed, overlap
-from overlapper.shapes.table import facts
+from overlapper.shapes.table import KINDS
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "paper"]
@@ -129,7 +129,8 @@ def _inclusion_exclusion(
 ) -> bool:
     """Add up all terms. False if there are too many; the sum is then invalid."""
     tolerance = max((each.tolerance for each in pairs.values()), default=COARSE)
-    most = TERMS * len(pairs)
+    smooth = any(KINDS[type(each.shape)].planes is None for each in (*a, *b))
+    most = (SMOOTH_TERMS if smooth else TERMS) * len(pairs)
     boxes = {pair: np.asarray(each.bounds) for pair, each in pairs.items()}
     waiting: list[tuple[tuple[int, ...], tuple[int, ...], Array]] = []
     for (i, j), each in pairs.items():
@@ -142,8 +143,6 @@ def _inclusion_exclusion(
             high = np.min([box[1], *(boxes[pair][1] for pair in met)], axis=0)
             if not (low < high).all():
                 continue
-            if found.terms == TERMS * len(pairs) and any(facts(each.shape).planes is None for each in (*a, *b)):
-                most = SMOOTH_TERMS * len(pairs)
             if found.terms >= most:
                 return False
             part = overlap(*(a[i] for i in s), *(b[j] for j in t), tolerance=tolerance)

@@ -44,8 +44,9 @@ class Masses:
         A prism of a height field presses with its top alone.
         """
         areas: Array = np.array(found.gradient[:, 1, :3])
-        for side, sign in ((0, -1.0), (1, 1.0)) if self._tops is not None else ():
-            assert self._tops is not None
+        if self._tops is None:
+            return areas
+        for side, sign in ((0, -1.0), (1, 1.0)):
             tops = self._tops[found.pairs[:, side]]
             rows = np.flatnonzero(tops.any(axis=1))
             turns = self._bodies.orientations[found.pairs[rows, side]]
