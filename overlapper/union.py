@@ -117,7 +117,11 @@ def of_pairs(a: Sequence[Placed], b: Sequence[Placed], pairs: Mapping[tuple[int,
 
 
 def union_volume(shapes: Sequence[Placed]) -> tuple[float, float]:
-    """Volume (m³) of the union of bounded shapes, and a bound of its error."""
+    """Volume (m³) of the union of bounded shapes, and a bound of its error. Raises ValueError for unbounded shapes."""
+    if not shapes:
+        return 0.0, 0.0
+    if not all(KINDS[type(each.shape)].bounded for each in shapes):
+        raise ValueError("shapes must be bounded, because the volume of a half-space is infinite")
     low, high = (end([shape.bounds[k] for shape in shapes], axis=0) for k, end in enumerate((np.min, np.max)))
     around = Placed(Box(0.75 * (high - low)), (low + high) / 2)
     found = union_overlap(shapes, [around])

@@ -172,6 +172,12 @@ def test_cells_of_smooth_shapes_state_the_space_beside_them(monkeypatch):
     assert 0.001 * exact < abs(volume - exact) <= error
 
 
+def test_the_volume_of_no_shapes_is_zero_and_that_of_a_half_space_is_refused():
+    assert union_volume([]) == (0, 0)
+    with pytest.raises(ValueError, match=r"^shapes must be bounded"):
+        union_volume([Placed(Sphere(1)), Placed(HalfSpace([0, 0, 1], 0))])
+
+
 def test_unions_apart_share_nothing():
     found = of_pairs([Placed(Box([1, 1, 1]))], [Placed(Box([1, 1, 1]), [5, 0, 0])], {})
     assert not found and found.volume == found.volume_error == found.terms == 0
