@@ -92,11 +92,25 @@ using Doubles = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
   throw nb::value_error((name + " " + reason).c_str());
 }
 
+/// Whether a value is text, or has text in its rows. `float` and numpy would read a number from it.
+inline bool has_text(nb::handle value) {
+  if (nb::isinstance<nb::str>(value) || nb::isinstance<nb::bytes>(value)) return true;
+  if (nb::isinstance<nb::list>(value) || nb::isinstance<nb::tuple>(value)) {
+    for (nb::handle each : value)
+      if (has_text(each)) return true;
+    return false;
+  }
+  if (!nb::hasattr(value, "dtype") || !nb::hasattr(value.attr("dtype"), "kind")) return false;
+  const nb::object kind = value.attr("dtype").attr("kind");
+  return kind.equal(nb::str("U")) || kind.equal(nb::str("S"));
+}
+
 /// Any array_like as contiguous doubles. `expected` describes the required shape, for the message.
 inline Doubles to_doubles(nb::handle value, const std::string& name, const std::string& expected) {
   // An array of this kind is taken as it is, because a call of numpy takes longer than all other work on few poses.
   Doubles as_it_is;
   if (nb::ndarray_check(value) && nb::try_cast(value, as_it_is, false)) return as_it_is;
+  if (has_text(value)) fail(name, "must be " + expected);
   try {
     return nb::cast<Doubles>(nb::module_::import_("numpy").attr("ascontiguousarray")(value, "dtype"_a = "float64"));
   } catch (nb::python_error& error) {
@@ -133,6 +147,7 @@ std::pair<Vec3, Quaternion> matrix_pose(std::span<const double, 16> matrix, cons
 Quaternion rotation_quaternion(const Mat3& rotation);
 
 inline double to_double(nb::handle value, const std::string& name) {
+  if (nb::isinstance<nb::str>(value) || nb::isinstance<nb::bytes>(value)) fail(name, "must be a number");
   try {
     return nb::cast<double>(value.type().is(nb::handle((PyObject*)&PyFloat_Type))
                                 ? nb::borrow(value)
