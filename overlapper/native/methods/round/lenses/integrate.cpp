@@ -5,11 +5,13 @@
 #include <cmath>
 #include <tuple>
 
+#include "geometry/wide.h"
 #include "methods/round/slicing/rules.h"
 
 namespace overlapper::lenses {
 namespace {
 
+using slicing::Range;
 using slicing::Rule;
 using slicing::Series;
 
@@ -19,7 +21,7 @@ constexpr int kMostHalvings = 40;
 constexpr int kMostRules = 400;
 
 struct Part {
-  double low, high;
+  Range range;
   Sums sums;
   Series volume, area, border;
 };
@@ -38,7 +40,10 @@ class Integrating {
       const double middle = at.t[i] / 2 + at.t[i + 1] / 2;
       if (section(discs_, middle).outline == Outline::kNothing) continue;
       if (discs_.cuts > 0 && !(slice(discs_, middle, {}).moments.volume > 0)) continue;
-      parts[count++] = apply(at.t[i], at.t[i + 1], slicing::kNodes24);
+      Range range{at.t[i], at.t[i + 1]};
+      if (i > 0 && at.t[i - 1] < at.t[i]) range.before = at.t[i] - at.t[i - 1];
+      if (i + 2 < at.count && at.t[i + 1] < at.t[i + 2]) range.after = at.t[i + 2] - at.t[i + 1];
+      parts[count++] = apply(range, slicing::kNodes24);
     }
     for (int i = 0; i < count; ++i)
       volume_ += parts[i].sums.moments.volume, border_ += parts[i].sums.border,
@@ -54,21 +59,24 @@ class Integrating {
   }
 
  private:
-  Part apply(double low, double high, Rule rule) {
-    Part part{low, high, {}, {}, {}, {}};
+  Part apply(const Range& range, Rule rule) {
+    Part part{range, {}, {}, {}, {}};
     ++rules_;
-    const double width = high - low;
     for (const slicing::Node& node : rule) {
-      const double step = width * node.share, weight = width * node.weight, sine = width * node.sine;
-      const double near = low + step, far = high - step;
-      const Sums below = slice(discs_, near, wanted_, step - (near - low)),
-                 above = slice(discs_, far, wanted_, (high - far) - step);
-      part.sums.add(weight, below), part.sums.add(weight, above);
-      part.volume.add(node, sine * below.moments.volume, sine * above.moments.volume);
-      if (wanted_.closing) part.border.add(node, sine * below.border, sine * above.border);
-      if (wanted_.first)
-        part.area.add(node, sine * (below.first_area + below.second_area),
-                      sine * (above.first_area + above.second_area));
+      std::array<Sums, 2> at;
+      const std::array<Range::Place, 2> places = range.places(node);
+      for (int i = 0; i < 2; ++i) {
+        const DoubleDouble t = two_sum(places[i].end, places[i].step);
+        at[i] = slice(discs_, t.head, wanted_, t.tail);
+        part.sums.add(places[i].weight, at[i]);
+      }
+      const auto add = [&](Series& series, double low, double high) {
+        series.add(node, places[0].rate * low, places[1].rate * high);
+      };
+      const auto& [low, high] = at;
+      add(part.volume, low.moments.volume, high.moments.volume);
+      if (wanted_.closing) add(part.border, low.border, high.border);
+      if (wanted_.first) add(part.area, low.first_area + low.second_area, high.first_area + high.second_area);
     }
     result_.nodes += 2 * static_cast<int>(rule.size());
     return part;
@@ -94,12 +102,10 @@ class Integrating {
 
   void add(const Part& part, bool may_be_finer, int halvings) {
     if (!enough(part) && rules_ < kMostRules) {
-      if (may_be_finer && part.volume.ratio() < 1e-3)
-        return add(apply(part.low, part.high, slicing::kNodes32), false, halvings);
+      if (may_be_finer && part.volume.ratio() < 1e-3) return add(apply(part.range, slicing::kNodes32), false, halvings);
       if (halvings < kMostHalvings) {
-        const double middle = part.low / 2 + part.high / 2;
-        add(apply(part.low, middle, slicing::kNodes24), true, halvings + 1);
-        return add(apply(middle, part.high, slicing::kNodes24), true, halvings + 1);
+        for (const Range& half : part.range.halves()) add(apply(half, slicing::kNodes24), true, halvings + 1);
+        return;
       }
     }
     result_.sums.add(1, part.sums);

@@ -6,7 +6,7 @@
 
 namespace overlapper::slicing {
 
-inline constexpr int kMostNodes = 24;
+inline constexpr int kMostNodes = 32;
 
 /// One number for each of eight slices; compilers process two or four at once.
 inline constexpr int kRow = 8;

@@ -15,8 +15,8 @@
 namespace overlapper::slicing {
 namespace {
 
-constexpr std::array<Rule, 3> kRules{kNodes8, kNodes16, kNodes24};
-static_assert(2 * kNodes24.size() == kMostNodes);
+constexpr std::array<Rule, 4> kRules{kNodes8, kNodes16, kNodes24, kNodes32};
+static_assert(2 * kNodes32.size() == kMostNodes);
 static_assert(std::ranges::all_of(kRules, [](Rule rule) { return rule.size() % 2 == 0; }));
 
 /// If the relative error of a rule is smaller, no other rule is tried.
@@ -27,46 +27,46 @@ constexpr double kStretchedAreaError = 1e-11;
 /// nodes integrates the first 2 n terms, so its error is about the square of the n-th term.
 constexpr double kVolumeTail = 2e-9, kAreaTail = 1e-7;
 /// More nodes than any rule has. If so many are needed, half the interval would need hardly fewer.
-constexpr double kHopeless = 30;
+constexpr double kHopeless = 36;
 static_assert(kHopeless > kMostNodes);
+/// An interval is small if its width is a smaller fraction of that of all intervals.
+constexpr double kSmall = 0.1;
 constexpr int kMostHalvings = 48;
 /// The largest number of rules. Without it, halving would never end where two surfaces touch along a line.
 constexpr int kMostRules = 600;
 /// After so many rules, the area of a stretched ball keeps its error. Its element may change as sharply as at an edge.
 constexpr int kMostRulesForStretch = 240;
 
-/// The answer of a rule for the slices between two values of t.
+/// The answer of a rule for the slices of a range.
 struct RulePart {
   const Outline* outline;
-  double low, high;
+  Range range;
   Rule rule;
   Integrals integrals;
   Series volume, area;
   std::array<Sample, kMostNodes> samples;
-
-  double width() const { return high - low; }
 };
 
-RulePart apply(const Stack& stack, const Outline& outline, double low, double high, Rule rule) {
-  RulePart part{&outline, low, high, rule, {}, {}, {}, {}};
-  const double width = high - low;
+RulePart apply(const Stack& stack, const Outline& outline, const Range& range, Rule rule) {
+  RulePart part{&outline, range, rule, {}, {}, {}, {}};
   const int half = static_cast<int>(rule.size()), size = 2 * half;
   Nodes nodes;
   nodes.size = size;
+  std::array<double, kMostNodes> rate;
+  const auto put = [&](int i, const Range::Place& place) {
+    const DoubleDouble t = two_sum(place.end, place.step);
+    nodes.t[i] = t.head, nodes.tail[i] = t.tail, nodes.weight[i] = place.weight, rate[i] = place.rate;
+  };
   for (int i = 0; i < half; ++i) {
-    const double step = width * rule[i].share, weight = width * rule[i].weight;
-    const DoubleDouble from_low = two_sum(low, step), from_high = two_sum(high, -step);
-    nodes.t[i] = from_low.head, nodes.t[size - 1 - i] = from_high.head;
-    nodes.tail[i] = from_low.tail, nodes.tail[size - 1 - i] = from_high.tail;
-    nodes.weight[i] = nodes.weight[size - 1 - i] = weight;
+    const auto [low, high] = range.places(rule[i]);
+    put(i, low), put(size - 1 - i, high);
   }
   Slices slices;
   part.integrals = measure(stack, outline, nodes, slices);
   for (int i = 0; i < half; ++i) {
-    const double sine = width * rule[i].sine;
     const int mirror = size - 1 - i;
-    part.volume.add(rule[i], sine * slices.volume[i], sine * slices.volume[mirror]);
-    part.area.add(rule[i], sine * slices.area[i], sine * slices.area[mirror]);
+    part.volume.add(rule[i], rate[i] * slices.volume[i], rate[mirror] * slices.volume[mirror]);
+    part.area.add(rule[i], rate[i] * slices.area[i], rate[mirror] * slices.area[mirror]);
   }
   for (int i = 0; i < size; ++i) part.samples[i] = {nodes.t[i], slices.volume[i]};
   return part;
@@ -80,8 +80,13 @@ class Integrating {
   bool run(std::span<const Interval> intervals) {
     thread_local std::vector<RulePart> parts;
     parts.clear();
-    for (const Interval& interval : intervals)
-      parts.push_back(apply(stack_, interval.outline, interval.low, interval.high, first()));
+    const double whole = intervals.back().high - intervals.front().low;
+    for (size_t i = 0; i < intervals.size(); ++i) {
+      Range range{intervals[i].low, intervals[i].high};
+      if (i > 0) range.before = intervals[i - 1].high - intervals[i - 1].low;
+      if (i + 1 < intervals.size()) range.after = intervals[i + 1].high - intervals[i + 1].low;
+      parts.push_back(apply(stack_, intervals[i].outline, range, first(range.high - range.low < kSmall * whole)));
+    }
     for (const RulePart& part : parts) sum_.about += part.integrals.volume, area_ += part.integrals.area;
     volume_ += sum_.about;
     for (const RulePart& part : parts)
@@ -90,7 +95,8 @@ class Integrating {
   }
 
  private:
-  Rule first() const { return few_ ? kRules.front() : kRules.back(); }
+  /// With few nodes, a small rule is enough for small intervals. It is hardly ever enough for others.
+  Rule first(bool small) const { return few_ ? kRules[small ? 0 : 1] : kRules[2]; }
 
   /// The number of missing nodes of a rule, in halves of its present number.
   double lacks(const RulePart& part) const {
@@ -126,12 +132,11 @@ class Integrating {
   bool add(const RulePart& part, int halvings) {
     if (++sum_.rules > kMostRules) return false;
     if (const double lacking = lacks(part); lacking > 0) {
-      if (const auto rule = finer(part, lacking))
-        return add(apply(stack_, *part.outline, part.low, part.high, *rule), halvings);
-      if (halvings < kMostHalvings && part.width() > 1e-14 * (std::abs(part.low) + std::abs(part.high))) {
-        const double middle = part.low + part.width() / 2;
-        return add(apply(stack_, *part.outline, part.low, middle, first()), halvings + 1) &&
-               add(apply(stack_, *part.outline, middle, part.high, first()), halvings + 1);
+      if (const auto rule = finer(part, lacking)) return add(apply(stack_, *part.outline, part.range, *rule), halvings);
+      if (halvings < kMostHalvings && part.range.can_be_halved()) {
+        const auto [below, above] = part.range.halves();
+        return add(apply(stack_, *part.outline, below, first(false)), halvings + 1) &&
+               add(apply(stack_, *part.outline, above, first(false)), halvings + 1);
       }
     }
     add_as_it_is(part);
