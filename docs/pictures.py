@@ -40,6 +40,7 @@ MAKERS = (
     Maker("docs/why.py", ("why.png",), ("overlapper/viewer/*.py",)),
     Maker("docs/view.py", ("view.png",), (*PAGE, "scenes/franka_grasp.py")),
     Maker("docs/grip.py", ("grip.png",), (*PAGE, "scenes/franka_grasp.py")),
+    Maker("docs/tactile.py", ("tactile.png",), ("examples/tactile_image.py",)),
     Maker("docs/concave.py", ("concave.png",), (*PAGE, "examples/chain_links.py")),
     Maker("docs/regression.py", ("regression.png",), (*PAGE, "examples/ci/**/*")),
     Maker("docs/meshes.py", ("meshes.png",), PAGE),

@@ -15,6 +15,8 @@ Shapes and pair rules are read once, poses at every step. pybullet is not needed
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.forces.contact import VolumetricContact
 from overlapper.simulation.forces.forces import Forces
+from overlapper.simulation.forces.pads import TaxelGrid, Taxels
+from overlapper.simulation.forces.tactile import TactileImage
 from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
 from overlapper.simulation.mujoco.bodies import Bodies
 from overlapper.simulation.mujoco.contact import GeomContact
@@ -26,6 +28,9 @@ __all__ = [
     "GeomContact",
     "LinkContact",
     "LinkContacts",
+    "TactileImage",
+    "TaxelGrid",
+    "Taxels",
     "VolumetricContact",
     "link_contacts",
 ]

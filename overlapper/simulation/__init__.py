@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from overlapper.simulation.contacts import Contact, Contacts
     from overlapper.simulation.forces.contact import VolumetricContact
     from overlapper.simulation.forces.forces import Forces
+    from overlapper.simulation.forces.pads import TaxelGrid, Taxels
+    from overlapper.simulation.forces.tactile import TactileImage
     from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
     from overlapper.simulation.model import Decomposed, Skipped
     from overlapper.simulation.report import Report
@@ -50,6 +52,9 @@ __all__ = [
     "SkippedShapeWarning",
     "SubstepsWarning",
     "Surface",
+    "TactileImage",
+    "TaxelGrid",
+    "Taxels",
     "UnknownBodyWarning",
     "UnsettledWarning",
     "VolumetricContact",
@@ -76,6 +81,8 @@ __getattr__ = lazily(
         ),
         "forces.contact": ("VolumetricContact",),
         "forces.forces": ("Forces",),
+        "forces.pads": ("TaxelGrid", "Taxels"),
+        "forces.tactile": ("TactileImage",),
         "links": ("LinkContact", "LinkContacts", "link_contacts"),
         "bullet.recorder": ("Recorder",),
         "report": ("Report",),

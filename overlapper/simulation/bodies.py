@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import partial
@@ -18,7 +18,7 @@ from overlapper.simulation.cautions import SkippedShapeWarning
 from overlapper.simulation.collision_rules import Mask, Rules, partners
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.ground import Grounds
-from overlapper.simulation.layout import Layout
+from overlapper.simulation.layout import Layout, Pose
 from overlapper.simulation.mechanics import Mechanics
 from overlapper.simulation.model import BASE, Array, Color, Decomposed, LinkKey, ModelledBody, Skipped
 from overlapper.simulation.naming import Labels, link_names
@@ -316,6 +316,14 @@ class AnyBodies:
         Prisms of height fields have such a face, except at the border. None if no shape has one.
         """
         return self._layout.tops
+
+    @property
+    def frames(self) -> Callable[[LinkKey], Pose]:
+        """A function of (body, link) that returns the frame of the link at the last update, also after later ones.
+
+        A frame begins with a position in m and a quaternion xyzw. Links without modelled shapes have none.
+        """
+        return self._layout.frames()
 
     @property
     def rules(self) -> Rules:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -74,8 +75,11 @@ class Layout:
 
     def frame(self, collider: LinkKey) -> Pose:
         """The frame of a collider at the last `pose`."""
-        frame = self._read[self._place[collider]]
-        return (frame[:3].tolist(), frame[3:].tolist()) if isinstance(frame, np.ndarray) else frame
+        return self.frames()(collider)
+
+    def frames(self) -> Callable[[LinkKey], Pose]:
+        """A function that returns the frame of a collider at the last `pose`, also after later ones."""
+        return partial(_frame, self._place, self._read)
 
     def reach(self, rows: NDArray[np.intp]) -> Array:
         """(n,) how far the shapes in these rows extend from their own origins, m; infinite for planes."""
@@ -89,6 +93,11 @@ class Layout:
             return set()
         finite = (np.abs(self.positions) < FARTHEST).all(axis=1) & np.isfinite(self.orientations).all(axis=1)
         return {*self.owners[~finite].tolist()}
+
+
+def _frame(place: Mapping[LinkKey, int], read: Frames, collider: LinkKey) -> Pose:
+    frame = read[place[collider]]
+    return (frame[:3].tolist(), frame[3:].tolist()) if isinstance(frame, np.ndarray) else frame
 
 
 def _reach(shape: Shape) -> float:

@@ -216,6 +216,13 @@ def test_two_feet_press_as_hard_as_what_stands_on_them(run, tmp_path):
     assert (tmp_path / "foot_pressure.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_the_pad_of_a_finger_feels_the_grip(run, tmp_path):
+    ((felt, outside),) = numbers(r"felt ([\d.]+) N, outside ([\d.]+) N", run("tactile_image.py"))
+    # Two motors of 20 N. Both fingers together carry the bar of 0.3 kg.
+    assert felt + outside == pytest.approx(20, abs=0.2) and outside < 0.5
+    assert (tmp_path / "tactile_image.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_boxes_are_fitted_by_gradients(run):
     ratios = [value for (value,) in numbers(r"mean IoU ([01]\.\d+)", run("fit_boxes.py"))]
     assert ratios[0] < 0.6 and ratios[-1] > 0.999 and ratios == sorted(ratios)

@@ -13,9 +13,11 @@ from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.forces.coming import coming, followed
 from overlapper.simulation.forces.forces import Forces, mean
 from overlapper.simulation.forces.masses import Masses
+from overlapper.simulation.forces.pads import Pad
 from overlapper.simulation.forces.parameter import Layers, OfPair
+from overlapper.simulation.forces.tactile import TactileImage
 from overlapper.simulation.forces.told import Told
-from overlapper.simulation.model import Array
+from overlapper.simulation.model import Array, LinkKey
 
 # A swing that turns by more than so many radians in a step is followed by backward Euler.
 COARSE = 2.0
@@ -147,7 +149,8 @@ class VolumetricContact:
         self._told = Told(bodies)
         self._model()
         none = np.empty((0, 3))
-        self._found = Forces(bodies.overlaps(pairs=[]), none, none, none, none, np.empty(0, dtype=bool), np.empty(0))
+        undirected, no_stiffness = np.empty(0, dtype=bool), np.empty(0)
+        self._found = Forces(bodies.overlaps(pairs=[]), none, none, none, none, undirected, no_stiffness, bodies.frames)
         self.substeps = 0
         """The number of substeps of the last step."""
         self.sweeps = 0
@@ -246,7 +249,7 @@ class VolumetricContact:
         self._follow()
         contacts, masses = self.bodies.overlaps(pairs=self._among), self._masses
         found = contacts.overlaps
-        return mean(contacts, self._parts, masses.stiffness(found), masses.areas(found))
+        return mean(contacts, self._parts, masses.stiffness(found), masses.areas(found), self.bodies.frames)
 
     @property
     def last(self) -> Forces:
@@ -325,6 +328,32 @@ class VolumetricContact:
         """
         return self._found.on(body, link)
 
+    def pressure(self, link: LinkKey, grid: Pad, tolerance: float = 1e-2) -> TactileImage:
+        """The pressure and the shear on the taxels of a pad, in the last substep. See `Forces.pressure`.
+
+        Parameters
+        ----------
+        link : (int, int)
+            Body and link of the pad, -1 for the base. In MuJoCo: body and geom.
+        grid : TaxelGrid or Taxels
+            The taxels.
+        tolerance : float, default 0.01
+            Allowed relative error of the common volume of round bodies.
+
+        Returns
+        -------
+        TactileImage
+            An entry for each taxel.
+
+        Raises
+        ------
+        TypeError
+            If `grid` is something else.
+        ValueError
+            If there is no such link, it has no modelled shape, or `tolerance` is invalid.
+        """
+        return self._found.pressure(link, grid, tolerance)
+
     def __len__(self) -> int:
         return len(self._found)
 
@@ -399,7 +428,7 @@ class VolumetricContact:
 
         Returns the squares of the frequencies by row.
         """
-        self._contacts = self.bodies.overlaps(pairs=self._among)
+        self._contacts, self._frame = self.bodies.overlaps(pairs=self._among), self.bodies.frames
         if lost:
             of_lost = np.isin(self._contacts.keys[:, [0, 3]], [*lost]).any(axis=1)
             self._contacts = self._contacts[np.flatnonzero(~of_lost)]
@@ -430,7 +459,9 @@ class VolumetricContact:
             self._layers.distributed,
             dynamics.ahead(duration, velocity) if len(self._contacts) else None,
         )
-        self._found = Forces(self._contacts, force, torque, slip, normal, directed, self._stiffness, residual)
+        self._found = Forces(
+            self._contacts, force, torque, slip, normal, directed, self._stiffness, self._frame, residual
+        )
         self._told.of_residual(residual, self.sweeps)
         if not directed.all():
             self._told.of_direction(self._contacts, ~directed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,7 +13,11 @@ from overlapper import Overlaps
 from overlapper.columns import FORCE_COLUMNS, FORCE_MEASURES, Columns, Tabular
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.forces.energy import energies
-from overlapper.simulation.model import Array
+from overlapper.simulation.forces.pads import Pad
+from overlapper.simulation.forces.tactile import TactileImage, image
+from overlapper.simulation.layout import Pose
+from overlapper.simulation.model import Array, LinkKey
+from overlapper.simulation.settings import Asking
 
 # There is no patch where the area vector is less than this part of the surface of what is shared, as to the solver.
 NO_PATCH = 1e-6
@@ -43,6 +47,8 @@ class Forces(Tabular):
         False where the overlap has no direction. `normal` is then the last known one.
     stiffness : (p,) ndarray
         In Pa/m.
+    frame : callable
+        Returns position and quaternion xyzw of the frame of a link (body, link), at the time of the contacts.
     residual : float, default 0
         How much the solver still changed a slip when it ended, as a fraction of the largest slip. It is at most 1e-8 if
         the forces are settled. In a mean, it is the largest of all substeps.
@@ -55,6 +61,7 @@ class Forces(Tabular):
     normal: Array
     directed: NDArray[np.bool_]
     stiffness: Array
+    frame: Callable[[LinkKey], Pose]
     residual: float = 0.0
 
     @property
@@ -105,11 +112,7 @@ class Forces(Tabular):
         ValueError
             If there is no such body or link.
         """
-        known = self.contacts.names
-        if not any(id == body for id, _ in known):
-            raise ValueError(f"there is no body {body} in the simulation")
-        if link is not None and (body, link) not in known:
-            raise ValueError(f"body {body} has no link {link}")
+        self._check(body, link)
         force, moment = np.zeros(3), np.zeros(3)
         keys, centre = self.pairs, np.nan_to_num(self.centre)
         for first, sign in ((0, 1.0), (3, -1.0)):
@@ -119,6 +122,51 @@ class Forces(Tabular):
             force += sign * self.force[rows].sum(axis=0)
             moment += sign * (self.torque[rows] + np.cross(centre[rows], self.force[rows])).sum(axis=0)
         return force, moment
+
+    def pressure(self, link: LinkKey, grid: Pad, tolerance: float = 1e-2) -> TactileImage:
+        """The pressure and the shear on the taxels of a pad, as a tactile sensor feels them.
+
+        Each taxel gets the force of the pressures and the friction within its cell, seen along the normal of the
+        contact. The forces of all taxels and the force outside add up to the force on the link, to rounding. A contact
+        whose pressures do not press against the front of the pad is outside.
+
+        At rest, the pressure at a point is stiffness times the depth, and its integral over each cell is exact for
+        polyhedra. In motion, pressure and shear are the depth times linear functions of the place: the only ones with
+        the force and the torque of the contact.
+
+        Parameters
+        ----------
+        link : (int, int)
+            Body and link of the pad, -1 for the base. In MuJoCo: body and geom.
+        grid : TaxelGrid or Taxels
+            The taxels.
+        tolerance : float, default 0.01
+            Allowed relative error of the common volume of round bodies, which count as polytopes here. It has no
+            influence on the sum of all forces. Polyhedra are exact and ignore it.
+
+        Returns
+        -------
+        TactileImage
+            An entry for each taxel.
+
+        Raises
+        ------
+        TypeError
+            If `grid` is something else.
+        ValueError
+            If there is no such link, it has no modelled shape, or `tolerance` is invalid.
+        """
+        if not isinstance(grid, Pad):
+            raise TypeError(f"grid must be a TaxelGrid or Taxels, not {grid!r}")
+        if not (isinstance(link, tuple) and len(link) == 2):
+            raise ValueError(f"link must be (body, link), not {link!r}")
+        self._check(*link)
+        Asking(tolerance=tolerance)  # raises for an invalid value
+        try:
+            frame = self.frame(link)
+        except KeyError:
+            raise ValueError(f"link {link} has no modelled shape") from None
+        return image(self.contacts, self.force, self.torque, self.normal, frame, link, grid, tolerance)
 
     def between_links(self) -> dict[tuple[int, int, int, int], Array]:
         """Forces between links.
@@ -148,6 +196,14 @@ class Forces(Tabular):
         """
         return {**self.contacts.columns(), **dict(zip(FORCE_COLUMNS, self.measures.T))}
 
+    def _check(self, body: int, link: int | None) -> None:
+        """Raise a ValueError if there is no such body, or no such link of it."""
+        known = self.contacts.names
+        if not any(id == body for id, _ in known):
+            raise ValueError(f"there is no body {body} in the simulation")
+        if link is not None and (body, link) not in known:
+            raise ValueError(f"body {body} has no link {link}")
+
     def __len__(self) -> int:
         return len(self.force)
 
@@ -158,8 +214,14 @@ class Forces(Tabular):
         )
 
 
-def mean(contacts: Contacts, parts: Sequence[tuple[float, Forces]], stiffness: Array, area: Array) -> Forces:
-    """Return the mean forces of a step for the overlaps now.
+def mean(
+    contacts: Contacts,
+    parts: Sequence[tuple[float, Forces]],
+    stiffness: Array,
+    area: Array,
+    frame: Callable[[LinkKey], Pose],
+) -> Forces:
+    """Return the mean forces of a step for the overlaps now, with the frames of links now.
 
     `parts` are the parts of the step: each has its fraction of the step and its forces. `slip` is that of the last
     part. `stiffness` (p,) in Pa/m and the area vectors `area` (p, 3) in m² are those of the contacts.
@@ -183,7 +245,7 @@ def mean(contacts: Contacts, parts: Sequence[tuple[float, Forces]], stiffness: A
             lost = ~directed[now]
             normal[now[lost]] = forces.normal[then[lost]]
     residual = max((forces.residual for _, forces in parts), default=0.0)
-    return Forces(contacts, force, torque, slip, normal, directed, stiffness, residual)
+    return Forces(contacts, force, torque, slip, normal, directed, stiffness, frame, residual)
 
 
 def _codes(found: Overlaps, count: int) -> NDArray[np.int64]:
