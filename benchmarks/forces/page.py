@@ -226,6 +226,11 @@ def write_page(path: Path, folder: Path) -> Path:
         of["bounce", "volumetric", "face"],
         *(of["slide and spin", "volumetric", f"box {friction}"] for friction in ("ellipsoid", "distributed")),
     )
+    cubes, more_cubes, balls, more_balls = (
+        [abs(change) for change in of["collide", "volumetric", f"{kind} in {substeps} substeps"].values()]
+        for kind in ("cubes", "balls")
+        for substeps in (16, 64)
+    )
     soft, stiff = (of["stack", "volumetric", f"{stiffness} Pa/m"] for stiffness in ("1e7", "1e8"))
     return write(
         Path(__file__).with_name("page.md"),
@@ -245,5 +250,9 @@ def write_page(path: Path, folder: Path) -> Path:
         soft_speed=small(soft["speed"]),
         stiff=small(stiff["drift"]),
         shove=f"{1e6 * of['shove', 'volumetric', 'box']['way']:.0f}",
+        cubes=f"{100 * max(cubes):.1f} %",
+        cubes_by=small(max(abs(a - b) for a, b in zip(cubes, more_cubes))),
+        balls=small(max(balls)),
+        balls_64=small(max(more_balls)),
         loop=small(of["loop", "volumetric", "over a rim"]["work"]),
     )

@@ -166,9 +166,18 @@ def loops() -> Iterator[Row]:
     yield Row("loop", "volumetric", "over a rim", "work", abs(work) / stored)
 
 
+def collisions() -> Iterator[Row]:
+    """Bodies in space, without friction and dissipation: the change of their energy, by seed."""
+    for kind in ("cubes", "balls"):
+        for substeps in (16, 64):
+            for seed in range(3):
+                change = experiments.collide(kind, substeps, seed) - 1
+                yield Row("collide", "volumetric", f"{kind} in {substeps} substeps", seed, change)
+
+
 PARTS = (
     rests, bounces, rebounds, slides, inclines, shoves, spins, slides_and_spins, rolls, pushes, grips,
-    turntables, stacks, loops,
+    turntables, stacks, loops, collisions,
 )  # fmt: skip
 
 

@@ -368,6 +368,31 @@ def test_a_box_over_the_rim_of_another_is_pushed_aside_by_the_depth_over_the_bre
     assert x / z == pytest.approx(depth / (2 * HALF - over), rel=1e-9) and abs(y) < 1e-12
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_work_around_a_small_loop_follows_from_how_the_area_of_the_patch_changes(seed):
+    """Around a loop, the force V n does the work V (n × grad ln A) for each unit of area. n is -grad V / A."""
+    random = np.random.default_rng(seed)
+    cube, turns = Box([HALF] * 3), random.normal(size=(2, 4))
+    below = Placed(cube, (0, 0, 0), turns[0])
+    centre = 0.07 * np.array([0.6, -0.5, 0.7]) + 0.01 * random.normal(size=3)
+
+    def law(at):
+        shared = overlap(Placed(cube, at, turns[1]), below)
+        slope = shared.gradient[0, :3]
+        area = np.linalg.norm(slope)
+        return -shared.volume * slope / area, math.log(area)
+
+    u, v, _ = np.linalg.qr(random.normal(size=(3, 3)))[0].T
+    radius, angles = 1e-4, 2 * math.pi * np.arange(64) / 64
+    work = sum(
+        law(centre + radius * (math.cos(a) * u + math.sin(a) * v))[0] @ (math.cos(a) * v - math.sin(a) * u)
+        for a in angles
+    ) * (radius * angles[1])
+    growth = [(law(centre + step)[1] - law(centre - step)[1]) / 2e-6 for step in 1e-6 * np.eye(3)]
+    expected = np.cross(law(centre)[0], growth) @ np.cross(u, v) * math.pi * radius**2
+    assert work == pytest.approx(expected, rel=1e-3) and abs(expected) > 1e-15
+
+
 HAND = """<robot name="hand"><link name="palm"><inertial><mass value="0"/>
 <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>{}</robot>"""
 FINGER = """<link name="finger{0}"><inertial><mass value=".2"/>

@@ -30,6 +30,12 @@ def test_the_energy_loss_of_a_bounce_on_a_face_is_of_second_order_in_the_step():
     assert fine < coarse / 8
 
 
+def test_balls_keep_their_energy_and_cubes_change_it_by_the_law_not_by_the_step():
+    assert experiments.collide("balls", 16, seed=0) == pytest.approx(1, abs=1e-4)
+    coarse, fine = (experiments.collide("cubes", substeps, seed=0) for substeps in (16, 48))
+    assert 0.9 < fine < 0.99 and coarse == pytest.approx(fine, abs=1e-3)
+
+
 @pytest.mark.parametrize("drop", [0.5, 1.0])
 @pytest.mark.parametrize("dissipation", [1e-4, 5e-4, 2e-3])
 def test_dissipation_determines_the_loss_of_a_bounce_at_any_speed(dissipation, drop):

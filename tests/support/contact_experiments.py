@@ -489,3 +489,35 @@ def stack(law="volumetric", stiffness=1e8, seconds=10.0, count=5, **parameters) 
             after = np.array([world.position(cube) for cube in cubes])
             speed = max(np.abs(world.velocity(cube)).max() for cube in cubes)
     return float(np.abs(after - before).max()), float(speed)
+
+
+def collide(kind: str, substeps: int, seed: int, stiffness=1e6, seconds=0.25) -> float:
+    """Eight bodies that collide in space without friction and dissipation: their energy afterwards, over that before.
+
+    `kind` is "cubes" or "balls". No two of them touch any more at the end.
+    """
+    random = np.random.default_rng(seed)
+    with World(gravity=(0, 0, 0)) as world:
+        p.removeBody(world.plane, world.client)
+        bodies = []
+        for corner in np.ndindex(2, 2, 2):
+            side = np.array(corner) - 0.5
+            turn = random.normal(size=4)
+            at = {"position": 0.19 * side, "orientation": turn / np.linalg.norm(turn), "friction": 0}
+            if kind == "cubes":
+                bodies.append(world.box(*[HALF] * 3, **at))
+            else:
+                bodies.append(world.body(1, p.GEOM_SPHERE, radius=0.06, **at))
+            world.push(bodies[-1], -1.5 * side + random.normal(size=3) * 0.3, random.normal(size=3) * 2)
+        before = sum(kinetic(world, body) for body in bodies)
+        with world.contact(stiffness=stiffness, dissipation=0, substeps=substeps) as contact:
+            run(contact, seconds)
+            assert len(contact) == 0, "bodies still touch"
+        return float(sum(kinetic(world, body) for body in bodies) / before)
+
+
+def kinetic(world: World, body: int) -> float:
+    """The kinetic energy of a body, J."""
+    mass = p.getDynamicsInfo(body, -1, world.client)[0]
+    (linear, angular), turn = world.velocity(body), world.turn(body)
+    return float(mass * linear @ linear + world.inertia(body) @ (turn.T @ angular) ** 2) / 2
