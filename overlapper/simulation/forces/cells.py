@@ -19,7 +19,11 @@ def moments(triangles: Array, cells: Array) -> Array:
     Corners may repeat.
     """
     low, high = triangles[:, :, :2].min(axis=1), triangles[:, :, :2].max(axis=1)
-    near = (low[:, None] <= cells.max(axis=1)).all(axis=2) & (high[:, None] >= cells.min(axis=1)).all(axis=2)
+    least, most = cells.min(axis=1), cells.max(axis=1)
+    near = np.ones((len(triangles), len(cells)), dtype=bool)
+    for axis in (0, 1):
+        near &= low[:, None, axis] <= most[:, axis]
+        near &= high[:, None, axis] >= least[:, axis]
     which, owner = np.nonzero(near)
     parts = triangles[which]
     for k in range(cells.shape[1]):
@@ -56,9 +60,8 @@ def nearest(offsets: Array, reach: float) -> Array:
         offset = offsets[rows, other[rows]]
         start = offset / 2
         cut, _ = _left_of(cells[rows], start, start + offset[:, ::-1] * (-1, 1))
-        width = max(cells.shape[1], cut.shape[1])
-        cells = _widened(cells, width)
-        cells[rows] = _widened(cut, width)
+        cells = _widened(cells, cut.shape[1])
+        cells[rows] = cut
     return cells
 
 
@@ -75,19 +78,31 @@ def _left_of(polygons: Array, start: Array, end: Array) -> tuple[Array, NDArray[
     """
     along, to = end - start, polygons[..., :2] - start[:, None]
     side = along[:, :1] * to[..., 1] - along[:, 1:] * to[..., 0]
-    following = np.roll(side, -1, axis=1)
+    inside = side >= 0
+    rows = np.flatnonzero(inside.any(axis=1))
+    cut = np.flatnonzero(~inside[rows].all(axis=1))  # all others are wholly on the left
+    if not len(cut):
+        return polygons[rows], rows
+    parts = _cut(polygons[rows[cut]], side[rows[cut]])
+    width = max(parts.shape[1], polygons.shape[1])
+    found = _widened(polygons[rows], width)
+    found[cut] = _widened(parts, width)
+    return found, rows
+
+
+def _cut(polygons: Array, side: Array) -> Array:
+    """Return the parts of polygons (m, k, d) where `side` (m, k), which is linear along each edge, is not negative."""
     inside = side >= 0
     crossing = inside != np.roll(inside, -1, axis=1)
-    part = np.where(crossing, side, 0.0) / np.where(crossing, side - following, 1.0)
+    part = np.where(crossing, side, 0.0) / np.where(crossing, side - np.roll(side, -1, axis=1), 1.0)
     crossings = polygons + part[..., None] * (np.roll(polygons, -1, axis=1) - polygons)
-    rows = np.flatnonzero(inside.any(axis=1))
-    count = (inside.sum(axis=1) + crossing.sum(axis=1))[rows]
-    shape = len(rows), 2 * polygons.shape[1]
-    corners = np.stack([polygons, crossings], axis=2)[rows].reshape(*shape, polygons.shape[2])
-    keep = np.stack([inside, crossing], axis=2)[rows].reshape(shape)
-    order = np.argsort(~keep, axis=1, kind="stable")[:, : count.max(initial=1)]
+    count = inside.sum(axis=1) + crossing.sum(axis=1)
+    shape = len(polygons), 2 * polygons.shape[1]
+    corners = np.stack([polygons, crossings], axis=2).reshape(*shape, polygons.shape[2])
+    keep = np.stack([inside, crossing], axis=2).reshape(shape)
+    order = np.argsort(~keep, axis=1, kind="stable")[:, : count.max()]
     order = np.where(np.arange(order.shape[1]) < count[:, None], order, order[:, :1])  # the first corner repeats
-    return np.take_along_axis(corners, order[..., None], axis=1), rows
+    return np.take_along_axis(corners, order[..., None], axis=1)
 
 
 def _widened(polygons: Array, width: int) -> Array:
