@@ -312,6 +312,14 @@ def test_points_feel_no_farther_than_their_reach(world):
     assert felt.outside[2] == pytest.approx(G * (1 - polygon / 0.01), rel=1e-9)
 
 
+def test_points_that_are_pressed_from_behind_feel_nothing(world):
+    cube = world.box(*[HALF] * 3, position=[0, 0, HALF - G / 1e5])
+    contact = world.contact()
+    force = contact.forces().on(cube)[0]
+    felt = contact.pressure((cube, -1), Taxels([[0, 0, -HALF], [0.01, 0, -HALF]], [[0, 0, 1], [1, 0, 0]], reach=0.01))
+    assert not felt.force.any() and felt.outside == pytest.approx(force, rel=1e-15)
+
+
 def test_of_points_behind_each_other_the_front_one_feels(world):
     cube = world.box(*[HALF] * 3, position=[0, 0, HALF - G / 1e5])
     forces = at_rest(world.contact().forces())

@@ -132,7 +132,7 @@ class Forces(Tabular):
 
         At rest, the pressure at a point is stiffness times the depth, and its integral over each cell is exact for
         polyhedra. In motion, pressure and shear are the depth times linear functions of the place: the only ones with
-        the force and the torque of the contact.
+        the force and the torque of the contact. Where a contact tips fast, pressures at its edge may be negative.
 
         Parameters
         ----------
