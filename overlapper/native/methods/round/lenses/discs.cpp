@@ -73,14 +73,31 @@ Principal principal(const Mat3& k) {
   return {{value[order[0]], value[order[1]], value[order[2]]}, {axis[order[0]], axis[order[1]], axis[order[2]]}};
 }
 
-/// The direction across the slices. There are two such directions; this is the one that is more across the contact.
-Vec3 across_slices(const Principal& of, Vec3 contact) {
+/// The direction of a rim. If a face is much nearer to the inner point than a shallow part of the first body is wide,
+/// the common part is a sliver along the face and the body's surface. `contact` leads to the first body's centre. Zero
+/// if there is no such face.
+Vec3 rim(std::span<const slicing::Wall> walls, Vec3 contact, double slack) {
+  constexpr double kShallow = 1e-4, kNear = 0.05, kLeastAngle = 1e-3;
+  if (!(slack <= kShallow)) return {};
+  for (const slicing::Wall& wall : walls) {
+    if (wall.owner == slicing::kCut || !(wall.slack.head * wall.slack.head <= kNear * kNear * slack)) continue;
+    const Vec3 along = cross(rounded(wall.normal), contact);
+    if (norm2(along) > kLeastAngle * kLeastAngle * norm2(contact)) return unit(along);
+  }
+  return {};
+}
+
+/// The direction across the slices. There are two such directions; this is the one that is more across the contact, or
+/// more along a rim.
+Vec3 across_slices(const Principal& of, Vec3 contact, Vec3 rim) {
   const auto& [low, middle, high] = of.value;
   const double whole = high - low;
   if (!(whole > 4 * DBL_EPSILON * high)) return norm2(contact) > 0 ? any_orthogonal(unit(contact)) : of.axis[0];
   const double sine = std::sqrt((high - middle) / whole), cosine = std::sqrt((middle - low) / whole);
   const Vec3 a = cosine * of.axis[0] + sine * of.axis[2], b = cosine * of.axis[0] - sine * of.axis[2];
-  return unit(std::abs(overlapper::dot(a, contact)) <= std::abs(overlapper::dot(b, contact)) ? a : b);
+  const auto size = [](Vec3 p, Vec3 q) { return std::abs(overlapper::dot(p, q)); };
+  if (norm2(rim) > 0) return unit(size(a, rim) >= size(b, rim) ? a : b);
+  return unit(size(a, contact) <= size(b, contact) ? a : b);
 }
 
 /// Axes of a slice, and their images by K.
@@ -216,7 +233,8 @@ std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::s
   if (!(slack_first.head > 0) || walls.size() > kMostCuts) return std::nullopt;
   const Mat3 plain = rounded(k);
   const Vec3 contact = rounded(c);
-  const Axes axes = settled_axes(across_slices(principal(plain), contact), k);
+  const Vec3 along_rim = rim(walls, contact, slack_first.head);
+  const Axes axes = settled_axes(across_slices(principal(plain), contact, along_rim), k);
 
   Discs result;
   result.normal = axes.n, result.x = axes.x, result.y = axes.y;
@@ -227,7 +245,10 @@ std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::s
                      c_y = overlapper::dot(c, wide(axes.y));
   // About -c_n, in the plane where the first body's surface is across c. A small slack keeps the foot near.
   const double steep = c_x.head * c_x.head + c_y.head * c_y.head + slack_first.head;
-  const Flat lean{-c_n.head * c_x.head / steep, -c_n.head * c_y.head / steep};
+  Flat lean{-c_n.head * c_x.head / steep, -c_n.head * c_y.head / steep};
+  constexpr double kLeastAlong = 1e-2;
+  if (const double rise = overlapper::dot(along_rim, axes.n); std::abs(rise) > kLeastAlong)
+    lean = {overlapper::dot(along_rim, axes.x) / rise, overlapper::dot(along_rim, axes.y) / rise};
   result.lean = lean, result.first_level = c_n.head;
   const DoubleDouble lean_x{lean.x}, lean_y{lean.y};
   const WideVector along = axes.along_n + (lean_x * axes.along_x + lean_y * axes.along_y);

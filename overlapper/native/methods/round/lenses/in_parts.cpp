@@ -36,11 +36,14 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
     setting.view = pieces::stretched_view(pieces::PatchView(*pair.patch, 0), turn, stretch, {});
     in.view = View{setting.view.u0, setting.view.v0, setting.view.u, setting.view.v, setting.view.normal};
   }
+  bool contained = false;
   for (size_t i = 0; i < of_other.pieces.size(); ++i) {
-    const int round = of_other.pieces[i].round;
+    const int number = of_other.pieces[i].round;
+    const slicing::Round* round = number < 0 ? nullptr : &of_other.rounds[number];
     const std::span<const slicing::Wall> walls = of_other.of(static_cast<int>(i));
-    if (round < 0 ? !pieces::add_ball_in_walls(of_ellipsoid.rounds, walls, setting, sums)
-                  : !add_part(in, of_other.rounds[round], walls, sums))
+    if (round && contains_part(in, *round, walls)) round = nullptr, contained = true;
+    if (round ? !add_part(in, *round, walls, sums)
+              : !pieces::add_ball_in_walls(of_ellipsoid.rounds, walls, setting, sums))
       return std::nullopt;
   }
   const pieces::Totals& totals = sums.totals;
@@ -53,8 +56,9 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
     const bool same = (pair.owner == 0) != swapped;
     pair.patch->add_difference(same ? *sums.patch : none, same ? none : *sums.patch);
   }
-  pieces::RoundMeasures result =
-      pieces::in_world({totals, error, misplaced, in.moved, {}}, pair, ellipsoid, stretch, swapped);
+  pieces::OfBall of{totals, error, misplaced, in.moved, {}};
+  if (contained && in.moved == 0) of.moved = std::nullopt;
+  pieces::RoundMeasures result = pieces::in_world(of, pair, ellipsoid, stretch, swapped);
   result.area_error += of_other.gap_area;
   result.area_known = pair.with_area;
   return result;

@@ -36,6 +36,10 @@ struct InEllipsoid {
   double moved = 0;  ///< m: bound of the movement of surfaces by rounding, set by add_part()
 };
 
+/// Whether a ball or a cylinder contains all of the ellipsoid that is inside walls, and more: a ball about the disc
+/// that one wall cuts off. Such a round bounds nothing of the common part.
+bool contains_part(const InEllipsoid& of, const slicing::Round& round, std::span<const slicing::Wall> walls);
+
 /// Adds what the ellipsoid shares with the part of a ball or a cylinder inside walls. The ellipsoid is body 0, and the
 /// patch is of its surface. The radius and the axis of the round are those of the world, along the ellipsoid's axes.
 /// False if a part cannot be measured.

@@ -36,6 +36,23 @@ double area_rate(const slicing::Round& round, Vec3 across, Vec3 half_axes) {
 
 }  // namespace
 
+bool contains_part(const InEllipsoid& of, const slicing::Round& round, std::span<const slicing::Wall> walls) {
+  const Vec3 centre = rounded(of.centre);
+  Vec3 middle = centre;
+  double square = 1;
+  for (const slicing::Wall& wall : walls) {
+    const Vec3 normal = rounded(wall.normal);
+    const double beyond = overlapper::dot(normal, centre) - wall.slack.head;
+    if (beyond > 0 && 1 - beyond * beyond < square) square = 1 - beyond * beyond, middle = centre - beyond * normal;
+  }
+  const SecondBall second = second_ball(round, of.stretch.half_axes);
+  const Vec3 off = rounded(second.k * wide(middle) - second.middle);
+  double stretch = 0;  // bound of the square of the length of K u for a unit vector u
+  for (const WideVector& row : {second.k.row0, second.k.row1, second.k.row2}) stretch += norm2(rounded(row));
+  constexpr double kShallow = 0.05, kInside = 1 - 1e-6;
+  return square <= kShallow && norm(off) + std::sqrt(std::max(0.0, square) * stretch) <= kInside;
+}
+
 bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slicing::Wall> walls, pieces::Sums& sums) {
   std::optional<Discs> found = discs(of.centre, second_ball(round, of.stretch.half_axes), walls);
   if (!found) return false;
