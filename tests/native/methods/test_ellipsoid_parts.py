@@ -257,3 +257,13 @@ def test_a_thin_ellipsoid_and_a_hull_of_many_facets_are_sliced_in_parts():
     assert found.volume == pytest.approx(4 / 3 * np.pi * 0.3e-9, rel=1e-12)
     cut = overlap(hull, Placed(Ellipsoid([1.2, 1.3, 1e-8]), (0.1, 0.2, 0.3), (1, 2, 3, 4)))
     assert "dual" not in cut.way and cut.volume_error <= 1e-11 * cut.volume
+
+
+def test_a_corner_of_many_facets_is_sliced():
+    """Any three walls at the tip of a pyramid meet there: more changes of outlines than a list holds."""
+    sides = 24
+    ring = np.array([[np.cos(at), np.sin(at), -0.3] for at in 2 * np.pi * np.arange(sides) / sides])
+    pyramid = Placed(RoundedHull(np.vstack([ring, [0, 0, 0.3]]), 1e-3), (0, 0, 0), (1, 2, 3, 4))
+    ellipsoid = Placed(Ellipsoid([0.3, 0.5, 0.4]), 0.3 * rotation(pyramid.orientation)[:, 2], (0.3, 0.1, -0.2, 1))
+    found = overlap(pyramid, ellipsoid)
+    assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume

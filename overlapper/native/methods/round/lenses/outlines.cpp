@@ -83,7 +83,7 @@ Changes changes(const Discs& discs) {
   }
   if (discs.cuts > 0) add_changes_by_walls(discs, low, high, result);
   result.add(high);
-  std::sort(result.t.begin(), result.t.begin() + result.count);
+  result.sort();
   std::array<double, kMostChanges + 4> places;
   const auto behind = std::copy_n(result.t.begin(), result.count, places.begin());
   const std::span<const double> others(places.begin(), std::ranges::copy(discs.ends(), behind).out);
@@ -91,7 +91,7 @@ Changes changes(const Discs& discs) {
   const Grading grading = discs.cuts > 0 ? Grading{0.5, 6} : Grading{1.0 / 8, 24};
   for (int i = 0, changes = result.count; i + 1 < changes; ++i)
     add_steps(places[i], places[i + 1], others, grading, result);
-  std::sort(result.t.begin(), result.t.begin() + result.count);
+  result.sort();
   return result;
 }
 

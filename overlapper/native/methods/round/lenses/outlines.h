@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "methods/round/lenses/discs.h"
@@ -15,7 +16,13 @@ struct Changes {
   int count = 0;
 
   void add(double at) {
-    if (count < static_cast<int>(t.size())) t[count++] = at;
+    if (count == kMostChanges) sort();
+    if (count < kMostChanges) t[count++] = at;
+  }
+  /// Where many walls meet, equal values are found again and again. One of each is kept.
+  void sort() {
+    std::sort(t.begin(), t.begin() + count);
+    count = static_cast<int>(std::unique(t.begin(), t.begin() + count) - t.begin());
   }
 };
 Changes changes(const Discs& discs);
