@@ -849,3 +849,20 @@ def test_a_corner_far_along_a_slice_lies_on_the_line_that_is_near():
     )
     lower, upper = found.certificate().verify()
     assert max(abs(found.volume - lower), abs(found.volume - upper)) <= found.volume_error <= 1e-12 * found.volume
+
+
+@pytest.mark.parametrize("out", [1e-5, 1e-6])
+def test_a_rim_that_just_leaves_the_end_of_a_capsule_is_cut_as_by_a_ball(out):
+    """The corner of a slice is outside the ball between two samples, one of which is nearly on the ball."""
+    capsule, ball = Placed(Capsule(0.4, 0.9), (0, 0, -0.45)), Sphere(0.4)
+    for seed in (56, 57, 105, 172, 196, 204, 557, 599, 773):
+        rng = np.random.default_rng(seed)
+        quaternion = rng.normal(size=4)
+        turn = rotation(quaternion / np.linalg.norm(quaternion))
+        angle, slope = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 1.4)
+        ahead = np.cos(angle) * turn[:, 0] + np.sin(angle) * turn[:, 1]
+        tip = (0.4 + out) * (np.cos(slope) * ahead + np.sin(slope) * turn[:, 2])
+        cylinder = Placed(Cylinder(0.12, 0.04), tip - 0.12 * ahead - 0.02 * turn[:, 2], quaternion)
+        found, truth = overlap(capsule, cylinder), overlap(ball, cylinder)
+        assert truth.volume < (1 - out**2 / 10) * cylinder.shape.volume
+        assert abs(found.volume - truth.volume) <= found.volume_error + truth.volume_error, seed

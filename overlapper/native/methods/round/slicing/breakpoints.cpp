@@ -31,8 +31,8 @@ class Candidates {
   static constexpr int kSamples = 24;
   static_assert(kSamples % kRow == 0);
   static constexpr int kMostTurns = 12;
-  /// Relative values at a turn: below the first one, closer values may be zero; below the second one, it is zero but
-  /// for rounding.
+  /// Values at a turn, relative to those of the samples on either side: below the first one, closer values may be zero;
+  /// below the second one, it is zero but for rounding.
   static constexpr double kGrazing = 0.1, kTouching = 1e-9;
   using Samples = std::array<double, kSamples>;
 
@@ -228,7 +228,7 @@ class Candidates {
   template <class Function, class Between>
   void add_turn(std::array<double, 3> t, std::array<double, 3> value, int i, int j, Function at, Between between) {
     const bool negative = value[1] < 0;
-    const double size = std::max(std::abs(value[0]), std::abs(value[2])), first = std::abs(value[1]);
+    const double size = std::max(std::abs(value[0]), std::abs(value[2]));
     for (int step = 0; step < kMostTurns; ++step) {
       const double p = t[1] - t[0], q = t[2] - t[1];
       const double fall = (value[1] - value[0]) / p, rise = (value[2] - value[1]) / q, curve = (rise - fall) / (p + q);
@@ -250,7 +250,7 @@ class Candidates {
         const int end = later ? 2 : 0;
         t[end] = turn, value[end] = there;
       }
-      if (!(std::abs(value[1]) < kGrazing * first)) break;
+      if (!(std::abs(value[1]) < kGrazing * size)) break;
     }
     if (std::abs(value[1]) <= kTouching * size) add_if_near(Slice(stack_, t[1]).corner(i, j), t[1]);
   }
