@@ -84,13 +84,15 @@ def judged(family: str, seed: int) -> Row:
 # Cases in watched processes
 
 
-def rows(wanted: Iterable[Job], workers: int, judge: Judge, first: Job) -> Iterator[Row]:
+def rows(
+    wanted: Iterable[Job], workers: int, judge: Judge, first: Job, time_limit: float = TIME_LIMIT
+) -> Iterator[Row]:
     """In the order in which they are finished. `first` is asked before the time counts."""
     waiting, finished = iter(wanted), SimpleQueue[Row | None]()
     todo: SimpleQueue[Job | None] = SimpleQueue()
 
     def work() -> None:
-        with Watched(judge, TIME_LIMIT, first, PATIENCE) as watched:
+        with Watched(judge, time_limit, first, PATIENCE) as watched:
             while (job := todo.get()) is not None:
                 answer = watched.ask(*job)
                 row = answer if isinstance(answer, dict) else {"broken": answer}
@@ -118,11 +120,15 @@ def run(
     judge: Judge = judged,
     first: Job = ("general", 0),
     columns: Sequence[str] = COLUMNS,
+    time_limit: float = TIME_LIMIT,
+    before: Iterable[Row] = (),
 ) -> list[Row]:
-    done = []
+    """Rows of an earlier run, `before`, are written again and come first."""
+    done = list(before)
     path.parent.mkdir(parents=True, exist_ok=True)
     with results.writing(path, columns) as write:
-        for row in rows(wanted, workers, judge, first):
+        write([row.get(column, "") for column in columns] for row in done)
+        for row in rows(wanted, workers, judge, first, time_limit):
             write([[row.get(column, "") for column in columns]])
             done.append(row)
             if row["broken"]:

@@ -4,6 +4,7 @@ import re
 
 from costs import audit, recording
 from harness import command
+from stability import graded
 
 
 def said(capsys, *arguments):
@@ -64,3 +65,21 @@ def test_hard_cases_are_checked_by_the_rules(capsys, tmp_path):
     words = said(capsys, "stress", "--count=3", "--family=general", "--workers=1", f"--out={tmp_path / 'rows.csv'}")
     assert re.search(r"\| all \| 3 \| \d+ \| \d+ \|.*\| 0 \|\n", words)
     assert len((tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines()) == 4
+
+
+def test_graded_contacts_go_on_where_a_run_was_stopped(capsys, tmp_path):
+    rows = tmp_path / "rows.csv"
+    asked = ("graded", "--pairs=ball, ball", "--workers=1", f"--out={rows}")
+    assert re.search(r"\| all \| 1 \| 1 \| 0 \|", said(capsys, *asked, "--count=1"))
+    first = rows.read_text(encoding="utf-8")
+    assert re.search(r"\| all \| 2 \| 2 \| 0 \|", said(capsys, *asked, "--count=2", "--resume"))
+    both = rows.read_text(encoding="utf-8")
+    assert both.startswith(first) and len(both.splitlines()) == 3
+
+
+def test_graded_contacts_that_take_too_long_are_counted():
+    ran = {"broken": "", "status": "overlapping", "stated": "1e-14", "proof": graded.ENDED}
+    line = graded.summary("ball, ball", [ran, {"broken": "not waited for beyond 60 s"}])
+    assert [line[name] for name in ("cases", "ran", "out of time", "proved", "proofs out of time", "failures")] == [
+        2, 1, 1, 0, 1, 1,
+    ]  # fmt: skip

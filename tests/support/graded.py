@@ -4,14 +4,17 @@ A contact has a depth between 1e-1 and 1e-10 of the smallest size of the two bod
 factor of up to 100, are nearly equal, or are equal in pairs. Bodies meet from outside, from inside, parallel, or as
 copies of one shape; every third pair is up to 1e6 m away from the origin.
 
-The volume is compared with bounds proved in ball arithmetic or in rational arithmetic. Depths are compared with the
-supports of both bodies, in extended precision. Other measures are compared with those of the dual hull.
+The volume is compared with bounds proved in ball arithmetic or in rational arithmetic, and with the sum of both halves
+that a plane cuts. Depths are compared with the supports of both bodies, in extended precision. Other measures are
+compared with those of the dual hull.
 """
 
 from __future__ import annotations
 
+import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations_with_replacement
@@ -281,13 +284,19 @@ class Judged:
     seconds: float  # of the first call, for the volume
     off: float | None = None  # by what part of the volume it is off
     share: float | None = None  # by what part of the stated error it is off
+    halves_off: float | None = None  # by what part of the volume the sum of two halves differs
     proof_seconds: float | None = None
+    proof_ended: bool = False  # because it took longer than allowed
     proof_width: float | None = None
     depth_off: float | None = None  # in sizes
     complaints: tuple[str, ...] = ()
 
 
-def judge(contact: Contact, proved: bool) -> Judged:
+def judge(contact: Contact, proved: bool, proof_limit: float | None = None, only_volume: bool = False) -> Judged:
+    """Asks for all measures, or for the volume alone, which takes a tenth of the time.
+
+    A proof ends after `proof_limit` seconds of the processor, if that is given.
+    """
     a, b = contact.a, contact.b
     least = None
     for _ in range(2):  # a second pair that is equal, because another process may have taken the processor
@@ -297,11 +306,13 @@ def judge(contact: Contact, proved: bool) -> Judged:
         taken = time.process_time() - begin
         least = taken if least is None else min(least, taken)
     result = Judged(found, least)
-    wrong = [*depth_complaints(a, b, found, result)]
+    wrong = [] if only_volume else [*depth_complaints(a, b, found, result)]
     if found:
-        wrong += volume_complaints(found, result, proved)
-        wrong += order_complaints(found, overlap(b, a))
-        wrong += measure_complaints(a, b, found)
+        wrong += volume_complaints(found, result, proved, proof_limit)
+        wrong += halves_complaints(a, b, found, result)
+        wrong += order_complaints(found, overlap(b, a), () if only_volume else ("area", "depth"))
+        if not only_volume:
+            wrong += measure_complaints(a, b, found)
     result.complaints = tuple(wrong)
     return result
 
@@ -346,7 +357,31 @@ def bounds(found: Overlap) -> tuple[Fraction, Fraction]:
     return (proof.lower, proof.upper) if isinstance(proof, Bracketed) else proof.verify()
 
 
-def volume_complaints(found: Overlap, result: Judged, proved: bool) -> Iterator[str]:
+@contextmanager
+def ended_after(seconds: float | None) -> Iterator[None]:
+    """Raises TimeoutError after so many seconds of the processor. For the main thread of a process."""
+    if seconds is None:
+        yield
+        return
+    late = []
+
+    def end(*_: object) -> None:
+        late.append(True)
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGPROF, end)
+    # Again and again: callbacks of compiled code may drop an exception.
+    signal.setitimer(signal.ITIMER_PROF, seconds, 0.01)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+    if late:
+        raise TimeoutError
+
+
+def volume_complaints(found: Overlap, result: Judged, proved: bool, proof_limit: float | None = None) -> Iterator[str]:
     stated = found.volume_error / found.volume
     if not stated <= STATED:
         yield f"the stated error is {stated:.1g} of the volume, by {found.way}"
@@ -355,7 +390,12 @@ def volume_complaints(found: Overlap, result: Judged, proved: bool) -> Iterator[
     if not proved:
         return
     begin = time.process_time()
-    lower, upper = bounds(found)
+    try:
+        with ended_after(proof_limit):
+            lower, upper = bounds(found)
+    except TimeoutError:
+        result.proof_ended = True
+        return
     result.proof_seconds = time.process_time() - begin
     result.proof_width = float((upper - lower) / upper)
     volume, error = Fraction(found.volume), Fraction(found.volume_error)
@@ -369,10 +409,24 @@ def volume_complaints(found: Overlap, result: Judged, proved: bool) -> Iterator[
         yield f"the proved bounds are {result.proof_width:.1g} of the volume apart"
 
 
-def order_complaints(found: Overlap, other: Overlap) -> Iterator[str]:
+def halves_complaints(a: Placed, b: Placed, found: Overlap, result: Judged) -> Iterator[str]:
+    """A plane through the centroid cuts the common set in two, and their volumes add up."""
+    if any(isinstance(body.shape, Ellipsoid) for body in (a, b)):
+        return  # groups with an ellipsoid are measured by the dual hull alone
+    normal = directions(np.random.default_rng(1), 1)[0]
+    offset = float(normal @ found.centroid)
+    halves = [overlap(a, b, HalfSpace(side * normal, side * offset)) for side in (1, -1)]
+    volume, error = sum(half.volume for half in halves), sum(half.volume_error for half in halves)
+    off = abs(volume - found.volume)
+    result.halves_off = off / found.volume
+    if off > error + found.volume_error:
+        yield f"two halves are off by {result.halves_off:.1g} of the volume, by {halves[0].way} and {halves[1].way}"
+
+
+def order_complaints(found: Overlap, other: Overlap, names: Iterable[str]) -> Iterator[str]:
     if abs(found.volume - other.volume) > found.volume_error + other.volume_error:
         yield "the volume depends on the order"
-    for name in ("area", "depth"):
+    for name in names:
         if abs(getattr(found, name) - getattr(other, name)) > getattr(found.errors, name) + getattr(other.errors, name):
             yield f"the {name} depends on the order"
 

@@ -1,6 +1,9 @@
 """Graded contacts of all 44 classes of pairs keep every rule. `python benchmarks graded` asks many more."""
 
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import graded
 import numpy as np
@@ -43,6 +46,28 @@ def test_contacts_are_as_deep_as_they_are_meant_to_be():
         assert found.depth == pytest.approx(contact.depth * smallest, rel=1e-3, abs=1e-15 * (1 + far))
         depths.append(contact.depth)
     assert min(depths) < 1e-8 and max(depths) > 1e-3
+
+
+def test_a_proof_ends_in_time():
+    """In the main thread of a process of its own, as in the benchmark."""
+    asked = "graded.judge(graded.made('ellipsoid, ellipsoid', 1), True, 1e-3)"
+    words = f"import graded; j = {asked}; print(bool(j.found), j.proof_ended, j.off, j.complaints)"
+    folder = Path(graded.__file__).parent
+    said = subprocess.run([sys.executable, "-c", words], cwd=folder, capture_output=True, text=True, check=True)
+    assert said.stdout == "True True None ()\n"
+
+
+def test_rules_for_volumes_alone_ask_for_no_depth():
+    judged = graded.judge(graded.made("ball, cylinder", 1), False, only_volume=True)
+    assert judged.found and judged.depth_off is None and judged.halves_off < 1e-12 and not judged.complaints
+
+
+def test_halves_of_another_contact_do_not_add_up():
+    a, b = Placed(Sphere(1)), Placed(Sphere(0.5), (1.4, 0, 0))
+    found, other = overlap(a, b), overlap(a, Placed(Sphere(0.5), (1.4 + 1e-9, 0, 0)))
+    result = graded.Judged(found, 0.0)
+    assert not [*graded.halves_complaints(a, b, found, result)] and result.halves_off < 1e-13
+    assert any("halves" in each for each in graded.halves_complaints(a, b, other, result))
 
 
 def test_a_wrong_answer_is_complained_about():
