@@ -1573,6 +1573,10 @@ class TimeOfImpact:
 
     def __deepcopy__(self, memo: object) -> object: ...
 
+    def __getstate__(self) -> tuple[object, ...]: ...
+
+    def __setstate__(self, state: tuple[object, ...]) -> None: ...
+
 def time_of_impact(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, motion_a: tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike] | Placed | None = None, motion_b: tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike] | Placed | None = None, duration: float = 1.0, tolerance: float = 1e-09) -> TimeOfImpact:
     """
     The time of the first common point of two moving shapes.

@@ -8,6 +8,9 @@
 namespace overlapper::python {
 namespace {
 
+constexpr std::array kMeetings{Meeting::kSeparated, Meeting::kImpact, Meeting::kTouching, Meeting::kOverlapping,
+                               Meeting::kOpen};
+
 const char* status_name(Meeting status) {
   switch (status) {
     case Meeting::kSeparated: return "separated";
@@ -80,6 +83,29 @@ TimeOfImpact find(nb::handle a_given, nb::handle b_given, nb::handle motion_a, n
   return unlocked([&] { return TimeOfImpact{time_of_impact(a, b, of_a, of_b, duration, width), width}; });
 }
 
+/// All numbers of the answer: its inputs are not kept.
+nb::tuple impact_state(const TimeOfImpact& t) {
+  const Impact& i = t.impact;
+  return nb::make_tuple(status_name(i.status), i.time, i.time_upper, i.distance, i.distance_time, to_numpy(i.normal),
+                        to_numpy(i.point), i.steps, t.width);
+}
+
+void set_impact_state(TimeOfImpact& self, nb::handle state) {
+  const char* const refusal = "state must be that of a time of impact";
+  if (!nb::isinstance<nb::tuple>(state) || nb::len(state) != 9) throw nb::value_error(refusal);
+  TimeOfImpact read{{}, to_double(state[8], "state")};
+  Impact& i = read.impact;
+  const nb::object name = state[0];
+  for (Meeting each : kMeetings)
+    if (name.equal(nb::str(status_name(each)))) i.status = each;
+  i.time = to_double(state[1], "state"), i.time_upper = to_double(state[2], "state");
+  i.distance = to_double(state[3], "state"), i.distance_time = to_double(state[4], "state");
+  i.normal = to_vec3(state[5], "state"), i.point = to_vec3(state[6], "state");
+  const bool known = name.equal(nb::str(status_name(i.status))) && nb::try_cast(state[7], i.steps);
+  if (!known) throw nb::value_error(refusal);
+  new (&self) TimeOfImpact(read);
+}
+
 template <class Getter>
 void property_if_met(nb::class_<TimeOfImpact>& cls, const char* name, Getter getter, const nb::sig& sig,
                      const char* doc) {
@@ -128,6 +154,8 @@ overlapping. None if separated.)");
   cls.def("__repr__", &repr);
   cls.def("__copy__", [](nb::handle self) { return nb::borrow(self); });
   cls.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
+  cls.def("__getstate__", &impact_state, nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+  cls.def("__setstate__", &set_impact_state, nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
   m.def("time_of_impact", &find, "a"_a.none(), "b"_a.none(), "motion_a"_a.none() = nb::none(),
         "motion_b"_a.none() = nb::none(), "duration"_a.none() = 1.0, "tolerance"_a.none() = 1e-9,
         nb::sig(("def time_of_impact(a: " + any_solid() + " | Placed, b: " + any_solid() +

@@ -232,6 +232,13 @@ def test_overlaps_are_pickled_between_processes(start):
     assert bits(in_another_process(start, copy.copy, there)) == bits(there)
 
 
+@pytest.mark.parametrize("distance", [1.2, 3, 0.5])
+def test_copies_and_pickles_of_times_of_impact_are_the_same(distance):
+    original = time_of_impact(Placed(Box([0.5, 0.5, 0.5]), (distance, 0, 0)), Sphere(0.5), ((-1, 0, 0), (1, 2, 3)))
+    for again in (pickle.loads(pickle.dumps(original)), copy.copy(original), copy.deepcopy([original])[0]):
+        assert bits(again) == bits(original) and repr(again) == repr(original)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_copies_and_pickles_of_overlaps_and_bodies_are_the_same(seed):
     rng = np.random.default_rng(seed)

@@ -17,9 +17,11 @@ from overlapper import (
     Placed,
     RoundedHull,
     Sphere,
+    TimeOfImpact,
     _core,
     overlap,
     overlaps,
+    time_of_impact,
 )
 
 POSES = np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
@@ -71,7 +73,7 @@ def test_a_surface_that_is_no_hull_is_refused(triangles):
 
 @pytest.mark.parametrize("state", [(), ((), 0.1), (None, 0.1), 3])
 def test_a_state_of_another_kind_is_refused(state):
-    for kind in (Hull, RoundedHull, Overlap, Overlaps, Batch):
+    for kind in (Hull, RoundedHull, Overlap, Overlaps, Batch, TimeOfImpact):
         with pytest.raises(ValueError, match="state must be that of"):
             kind.__new__(kind).__setstate__(state)
 
@@ -86,6 +88,14 @@ def test_an_altered_state_of_a_rounded_hull_or_an_overlap_is_refused():
     for state in ((bare, 0.1, "auto"), (bodies, 2.0, "auto"), (bodies, 0.1, "car"), (bodies[:1], 0.1, "auto")):
         with pytest.raises(ValueError, match=r"^[^\n]+$"):
             Overlap.__new__(Overlap).__setstate__(state)
+
+
+@pytest.mark.parametrize(("number", "value"), [(0, "late"), (0, 3), (1, "soon"), (5, (0, 1)), (6, None), (7, 0.5)])
+def test_an_altered_state_of_a_time_of_impact_is_refused(number, value):
+    state = [*time_of_impact(Sphere(1), Placed(Sphere(1), (3, 0, 0)), ((2, 0, 0), (0, 0, 0))).__getstate__()]
+    state[number] = value
+    with pytest.raises(ValueError, match=r"^state must be [^\n]+$"):
+        TimeOfImpact.__new__(TimeOfImpact).__setstate__(tuple(state))
 
 
 def some_overlaps(**options):
