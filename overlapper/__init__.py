@@ -16,12 +16,14 @@ from overlapper._core import (
     RoundedHull,
     Sphere,
     TimeOfImpact,
+    TimesOfImpact,
     distance,
     iou,
     overlap,
     overlaps,
     penetration_depth,
     time_of_impact,
+    times_of_impact,
 )
 from overlapper.face import lazily as _lazily
 from overlapper.functions import introspect as _introspect
@@ -55,6 +57,7 @@ __all__ = [
     "Shape",
     "Sphere",
     "TimeOfImpact",
+    "TimesOfImpact",
     "distance",
     "iou",
     "overlap",
@@ -62,6 +65,7 @@ __all__ = [
     "penetration_depth",
     "random_polytope",
     "time_of_impact",
+    "times_of_impact",
 ]
 
 distance = _introspectable(distance)
@@ -70,6 +74,7 @@ overlap = _introspectable(overlap)
 overlaps = _introspectable(overlaps)
 penetration_depth = _introspectable(penetration_depth)
 time_of_impact = _introspectable(time_of_impact)
+times_of_impact = _introspectable(times_of_impact)
 for _kind in (
     Batch,
     Box,
@@ -84,6 +89,7 @@ for _kind in (
     RoundedHull,
     Sphere,
     TimeOfImpact,
+    TimesOfImpact,
 ):
     _introspect(_kind)
 del _kind

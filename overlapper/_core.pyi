@@ -1,7 +1,7 @@
 """Convex shapes and the polytopes they share."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, Any, Literal, overload
+from typing import Annotated, Any, Literal, SupportsIndex, overload
 
 import numpy
 import numpy.typing
@@ -1614,4 +1614,107 @@ def time_of_impact(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | Rou
     >>> hit = time_of_impact(bullet, sheet, ((0, 0, -300), (0, 0, 0)), duration=0.01)
     >>> hit.status, round(hit.time, 9)
     ('impact', 0.003298333)
+    """
+
+class TimesOfImpact:
+    """
+    The answers of `times_of_impact`: an array for each quantity, with a row for each pair.
+
+    `found[i]` is the TimeOfImpact of row i.
+    """
+
+    STATUSES: tuple = ...
+
+    @property
+    def pairs(self) -> numpy.typing.NDArray[numpy.int32]:
+        """(p, 2) indices of the shapes a and b of each row."""
+
+    @property
+    def status(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        (p,) an index into TimesOfImpact.STATUSES, which has the names of TimeOfImpact.status.
+        """
+
+    @property
+    def time(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p,) s, not later than the first common point; NaN if separated."""
+
+    @property
+    def time_upper(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p,) s, as in TimeOfImpact; NaN if separated."""
+
+    @property
+    def normal(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p, 3) unit, from b to a at `time`; NaN if separated."""
+
+    @property
+    def point(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p, 3) m, as in TimeOfImpact; NaN if separated."""
+
+    @property
+    def distance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p,) m, the least distance of the computed poses."""
+
+    @property
+    def distance_time(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p,) s, when `distance` was seen."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, row: SupportsIndex) -> TimeOfImpact: ...
+
+    def __repr__(self) -> str: ...
+
+    def __getstate__(self) -> tuple[object, ...]: ...
+
+    def __setstate__(self, state: tuple[object, ...]) -> None: ...
+
+def times_of_impact(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh] | Batch, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None, end_positions: numpy.typing.ArrayLike, end_orientations: numpy.typing.ArrayLike | None, pairs: numpy.typing.ArrayLike | None = None, duration: float = 1.0, tolerance: float = 1e-09, threads: int | None = 1) -> TimesOfImpact:
+    """
+    The times of the first common points of many pairs of moving shapes.
+
+    The position of each shape moves along a line at a constant velocity. The shape turns at a constant rate the shorter
+    way.
+
+    Parameters
+    ----------
+    shapes : sequence of shapes, or Batch
+        The k shapes, without poses.
+    positions, orientations : (k, 3) and (k, 4) array_like, or (k, 4, 4) array_like and None
+        Poses at time 0, as `overlaps` takes them.
+    end_positions, end_orientations : (k, 3) and (k, 4) array_like, or (k, 4, 4) array_like and None
+        Poses at the end of the motion.
+    pairs : (p, 2) array_like of int, optional
+        Indices of the shapes of each pair. Default: all pairs that are not separated during the whole motion, sorted. Boxes
+        around the whole motion of each shape tell which pairs are examined.
+    duration : float, default 1.0
+        Length of the motion in s.
+    tolerance : float, default 1e-9
+        Wanted width of the intervals of times, as a fraction of `duration`.
+    threads : int or None, default 1
+        Number of threads. None: one on each core. The number does not change a bit of the results.
+
+    Returns
+    -------
+    TimesOfImpact
+        A row for each pair, as from `time_of_impact`.
+
+    Raises
+    ------
+    ValueError
+        If an argument has the wrong shape, a pose is not finite, or `pairs` has a pair of two half-spaces.
+
+    Examples
+    --------
+    >>> from overlapper import Box, Sphere, times_of_impact
+    >>> still = [[0, 0, 0, 1]] * 2
+    >>> found = times_of_impact([Sphere(0.01), Box([1, 1, 0.001])], [[0, 0, 1], [0, 0, 0]], still,
+    ...                         [[0, 0, -2], [0, 0, 0]], still)
+    >>> found.pairs.tolist(), found.time.round(6).tolist()
+    ([[0, 1]], [0.329667])
+    """
+
+def swept_pairs(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh] | Batch, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None, end_positions: numpy.typing.ArrayLike, end_orientations: numpy.typing.ArrayLike | None) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    The pairs of shapes whose boxes around the whole motion meet: (p, 2) indices i < j, sorted.
     """

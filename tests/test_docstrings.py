@@ -87,6 +87,7 @@ def test_every_function_and_shape_has_an_example_with_its_result():
         "penetration_depth",
         "iou",
         "time_of_impact",
+        "times_of_impact",
         "random_polytope",
         "Batch",
         "Placed",

@@ -1,13 +1,23 @@
-#include "batch/batch.h"
+#include "python/batch.h"
 
 #include <thread>
 
-#include "python/arrays.h"
+#include "batch/batch.h"
 
 namespace overlapper::python {
 namespace {
 
+std::vector<double> to_pose_rows(const Doubles& array, const std::string& name, size_t k, size_t columns) {
+  if (array.ndim() != 2 || array.shape(0) != k || array.shape(1) != columns)
+    fail(name, "must be an array of shape (k, " + std::to_string(columns) + "), one row per shape, not of shape " +
+                   shape_text(array));
+  return {array.data(), array.data() + k * columns};
+}
+
+}  // namespace
+
 std::vector<Shape> to_shapes(nb::handle given) {
+  if (nb::isinstance<Batch>(given)) return nb::cast<const Batch&>(given).shapes();
   if (!PySequence_Check(given.ptr())) throw nb::type_error("shapes must be a sequence of shapes");
   std::vector<Shape> shapes;
   for (nb::handle shape : nb::list(given))
@@ -15,35 +25,24 @@ std::vector<Shape> to_shapes(nb::handle given) {
   return shapes;
 }
 
-/// Positions and quaternions, one row per shape. The copies keep other threads from changing them.
-struct PoseRows {
-  std::vector<double> positions, orientations;
-};
-
-std::vector<double> to_pose_rows(const Doubles& array, const char* name, size_t k, size_t columns) {
-  if (array.ndim() != 2 || array.shape(0) != k || array.shape(1) != columns)
-    fail(name, "must be an array of shape (k, " + std::to_string(columns) + "), one row per shape, not of shape " +
-                   shape_text(array));
-  return {array.data(), array.data() + k * columns};
-}
-
-PoseRows to_poses(nb::handle positions, nb::handle orientations, size_t k) {
-  const Doubles given = to_doubles(positions, "positions", "an array of shape (k, 3) or (k, 4, 4), one row per shape");
+PoseRows to_poses(nb::handle positions, nb::handle orientations, size_t k, const std::string& prefix) {
+  const std::string of_positions = prefix + "positions", of_orientations = prefix + "orientations";
+  const Doubles given = to_doubles(positions, of_positions, "an array of shape (k, 3) or (k, 4, 4), one row per shape");
   const bool matrices = given.ndim() == 3;
   if (matrices && (given.shape(0) != k || given.shape(1) != 4 || given.shape(2) != 4))
-    fail("positions",
+    fail(of_positions,
          "must be an array of shape (k, 3) or (k, 4, 4), one row per shape, not of shape " + shape_text(given));
   if (matrices != orientations.is_none())
-    fail("orientations", matrices ? "must be left out if the positions are matrices"
-                                  : "must be given, unless the positions are matrices of shape (k, 4, 4)");
+    fail(of_orientations, matrices ? "must be left out if the positions are matrices"
+                                   : "must be given, unless the positions are matrices of shape (k, 4, 4)");
   if (!matrices)
-    return {to_pose_rows(given, "positions", k, 3),
-            to_pose_rows(to_doubles(orientations, "orientations", "an array of shape (k, 4), one row per shape"),
-                         "orientations", k, 4)};
+    return {to_pose_rows(given, of_positions, k, 3),
+            to_pose_rows(to_doubles(orientations, of_orientations, "an array of shape (k, 4), one row per shape"),
+                         of_orientations, k, 4)};
   PoseRows rows;
   for (size_t i = 0; i < k; ++i) {
     const std::span<const double, 16> matrix(given.data() + 16 * i, 16);
-    const auto [p, q] = matrix_pose(matrix, "positions[" + std::to_string(i) + "]");
+    const auto [p, q] = matrix_pose(matrix, of_positions + "[" + std::to_string(i) + "]");
     rows.positions.insert(rows.positions.end(), {p.x, p.y, p.z});
     rows.orientations.insert(rows.orientations.end(), {q.x, q.y, q.z, q.w});
   }
@@ -61,6 +60,10 @@ std::vector<IndexPair> to_pairs(nb::handle given, size_t k) {
     pairs.push_back({static_cast<int>(flat[i]), static_cast<int>(flat[i + 1])});
   return pairs;
 }
+
+std::string any_shapes() { return "collections.abc.Sequence[" + any_solid() + "]"; }
+
+namespace {
 
 nb::object overlaps_among(Batch& batch, nb::handle positions, nb::handle orientations, nb::handle pairs,
                           nb::handle tolerance_given, nb::handle threads_given, nb::handle method_name, bool separated,
@@ -176,10 +179,7 @@ nb::object candidates(Batch& batch, nb::handle positions, nb::handle orientation
     const nb::gil_scoped_release release;
     pairs = batch.candidate_pairs(p, q);
   }
-  std::vector<int> flat;
-  flat.reserve(2 * pairs.size());
-  for (const IndexPair& pair : pairs) flat.insert(flat.end(), pair.begin(), pair.end());
-  return nb::cast(to_numpy<IndexMatrix>(std::move(flat), {pairs.size(), 2}), nb::rv_policy::move);
+  return nb::cast(to_numpy(std::span<const IndexPair>(pairs)), nb::rv_policy::move);
 }
 
 /// The numpy form of a column's element: numbers of one type, in a shape.
@@ -303,12 +303,10 @@ nb::tuple state_of(const Overlaps& self) {
     positions.insert(positions.end(), pose.begin(), pose.begin() + 3);
     orientations.insert(orientations.end(), pose.begin() + 3, pose.end());
   }
-  std::vector<int> pairs;
-  for (const IndexPair& pair : self.pairs) pairs.insert(pairs.end(), pair.begin(), pair.end());
   const size_t k = self.poses->size();
   return nb::make_tuple(shape_list(*self.shapes), to_numpy<Matrix>(std::move(positions), {k, 3}),
                         to_numpy<Matrix>(std::move(orientations), {k, 4}),
-                        to_numpy<IndexMatrix>(std::move(pairs), {self.size(), 2}), self.tolerance, method_name(self),
+                        to_numpy(std::span<const IndexPair>(self.pairs)), self.tolerance, method_name(self),
                         self.examined, self.planes_asked);
 }
 
@@ -372,9 +370,6 @@ shape, or to find the plane nearest to a point.)");
 }
 
 #define OVERLAPPER_POSES "positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None = None"
-
-/// The type of a sequence of shapes in signatures.
-std::string any_shapes() { return "collections.abc.Sequence[" + any_solid() + "]"; }
 
 constexpr const char* kPosesDoc =
     R"(positions : (k, 3) or (k, 4, 4) array_like

@@ -1,12 +1,18 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
-#include "motion/time_of_impact.h"
+#include "batch/motions.h"
+#include "geometry/cancellation.h"
 #include "python/arrays.h"
+#include "python/batch.h"
 #include "python/frames.h"
 
 namespace overlapper::python {
 namespace {
+
+constexpr double kNotMet = std::numeric_limits<double>::quiet_NaN();
 
 constexpr std::array kMeetings{Meeting::kSeparated, Meeting::kImpact, Meeting::kTouching, Meeting::kOverlapping,
                                Meeting::kOpen};
@@ -52,13 +58,15 @@ Vec3 angular_velocity(Quaternion from, Quaternion to, double duration) {
   return sine > 0 ? (2 * std::atan2(sine, std::abs(turn.w)) / duration) * (v / sine) : Vec3{};
 }
 
+Velocity velocity_between(const Placed& start, const Placed& end, double duration) {
+  return {(end.position - start.position) / duration, angular_velocity(start.orientation, end.orientation, duration)};
+}
+
 Velocity to_velocity(nb::handle value, const Placed& body, double duration, const std::string& name) {
   if (value.is_none()) return {};
   Velocity velocity;
   if (nb::isinstance<Placed>(value)) {
-    const Placed& end = nb::cast<const Placed&>(value);
-    velocity.linear = (end.position - body.position) / duration;
-    velocity.angular = angular_velocity(body.orientation, end.orientation, duration);
+    velocity = velocity_between(body, nb::cast<const Placed&>(value), duration);
   } else {
     if (!nb::isinstance<nb::sequence>(value) || nb::len(value) != 2)
       fail(name, "must be a pair (linear velocity, angular velocity), a Placed at the end of the motion, or None");
@@ -72,11 +80,16 @@ Velocity to_velocity(nb::handle value, const Placed& body, double duration, cons
   return velocity;
 }
 
+double to_duration(nb::handle given) {
+  const double duration = to_double(given, "duration");
+  if (!(duration > 0 && duration < 1e25)) fail("duration", "must be greater than 0 and less than 1e25 s");
+  return duration;
+}
+
 TimeOfImpact find(nb::handle a_given, nb::handle b_given, nb::handle motion_a, nb::handle motion_b,
                   nb::handle duration_given, nb::handle tolerance_given) {
   const Placed a = to_placed(a_given, "a"), b = to_placed(b_given, "b");
-  const double duration = to_double(duration_given, "duration"), tolerance = to_tolerance(tolerance_given);
-  if (!(duration > 0 && duration < 1e25)) fail("duration", "must be greater than 0 and less than 1e25 s");
+  const double duration = to_duration(duration_given), tolerance = to_tolerance(tolerance_given);
   const Velocity of_a = to_velocity(motion_a, a, duration, "motion_a"),
                  of_b = to_velocity(motion_b, b, duration, "motion_b");
   const double width = tolerance * duration;
@@ -106,12 +119,235 @@ void set_impact_state(TimeOfImpact& self, nb::handle state) {
   new (&self) TimeOfImpact(read);
 }
 
+/// Answers for many pairs, a row each.
+struct TimesOfImpact {
+  std::vector<IndexPair> pairs;
+  std::vector<Impact> rows;
+  double width = 0;
+};
+
+std::vector<MovingBody> to_bodies(std::span<const Shape> shapes, const PoseRows& start, const PoseRows& end,
+                                  double duration) {
+  std::vector<MovingBody> bodies;
+  bodies.reserve(shapes.size());
+  const auto placed = [&](const PoseRows& rows, size_t i, const char* name) {
+    const double *p = &rows.positions[3 * i], *q = &rows.orientations[4 * i];
+    try {
+      return make_placed(shapes[i], {p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]});
+    } catch (const std::invalid_argument& error) {
+      fail(std::string(name) + " " + std::to_string(i) + ":", error.what());
+    }
+  };
+  for (size_t i = 0; i < shapes.size(); ++i) {
+    bodies.push_back({placed(start, i, "pose"), placed(end, i, "end pose"), {}});
+    MovingBody& body = bodies.back();
+    body.velocity = velocity_between(body.start, body.end, duration);
+    const bool known = finite(body.velocity.linear) && finite(body.velocity.angular);
+    if (!known) fail("duration", "is too short for the motion between pose " + std::to_string(i) + " and its end");
+  }
+  return bodies;
+}
+
+TimesOfImpact find_many(nb::handle shapes_given, nb::handle positions, nb::handle orientations,
+                        nb::handle end_positions, nb::handle end_orientations, nb::handle pairs_given,
+                        nb::handle duration_given, nb::handle tolerance_given, nb::handle threads_given) {
+  const std::vector<Shape> shapes = to_shapes(shapes_given);
+  const size_t k = shapes.size();
+  const PoseRows start = to_poses(positions, orientations, k),
+                 end = to_poses(end_positions, end_orientations, k, "end_");
+  const double duration = to_duration(duration_given), tolerance = to_tolerance(tolerance_given);
+  const int threads = to_threads(threads_given);
+  TimesOfImpact found;
+  found.width = tolerance * duration;
+  if (!pairs_given.is_none()) found.pairs = to_pairs(pairs_given, k);
+  for (const auto& [a, b] : found.pairs)
+    if (!bounded(shapes[a]) && !bounded(shapes[b]))
+      fail("pairs", "must not pair two half-spaces, as [" + std::to_string(a) + ", " + std::to_string(b) + "] does");
+  const bool finished = unlocked([&] {
+    const std::vector<MovingBody> bodies = to_bodies(shapes, start, end, duration);
+    if (pairs_given.is_none()) found.pairs = swept_pairs(bodies, duration);
+    found.rows.resize(found.pairs.size());
+    return times_of_impact(bodies, found.pairs, duration, found.width, threads, found.rows);
+  });
+  if (!finished) throw Cancelled{};
+  if (!pairs_given.is_none()) return found;
+  size_t kept = 0;
+  for (size_t i = 0; i < found.rows.size(); ++i) {
+    if (found.rows[i].status == Meeting::kSeparated) continue;
+    found.rows[kept] = found.rows[i], found.pairs[kept] = found.pairs[i];
+    ++kept;
+  }
+  found.rows.resize(kept), found.pairs.resize(kept);
+  return found;
+}
+
+/// Columns with NaN in the rows of separated pairs, or with a number in each row.
+void define_number(nb::class_<TimesOfImpact>& cls, const char* name, double Impact::* number, bool always,
+                   const char* doc) {
+  const std::string sig = "def " + std::string(name) + "(self) -> numpy.typing.NDArray[numpy.float64]";
+  cls.def_prop_ro(
+      name,
+      [number, always](const TimesOfImpact& found) {
+        std::vector<double> values;
+        for (const Impact& row : found.rows)
+          values.push_back(always || row.status != Meeting::kSeparated ? row.*number : kNotMet);
+        return to_numpy<Vector>(std::move(values), {found.rows.size()});
+      },
+      nb::rv_policy::move, nb::sig(sig.c_str()), doc);
+}
+
+void define_vector(nb::class_<TimesOfImpact>& cls, const char* name, Vec3 Impact::* vector, const char* doc) {
+  const std::string sig = "def " + std::string(name) + "(self) -> numpy.typing.NDArray[numpy.float64]";
+  cls.def_prop_ro(
+      name,
+      [vector](const TimesOfImpact& found) {
+        std::vector<Vec3> rows;
+        for (const Impact& row : found.rows)
+          rows.push_back(row.status == Meeting::kSeparated ? Vec3{kNotMet, kNotMet, kNotMet} : row.*vector);
+        return to_numpy(std::span<const Vec3>(rows));
+      },
+      nb::rv_policy::move, nb::sig(sig.c_str()), doc);
+}
+
 template <class Getter>
 void property_if_met(nb::class_<TimeOfImpact>& cls, const char* name, Getter getter, const nb::sig& sig,
                      const char* doc) {
   cls.def_prop_ro(
       name, [getter](const TimeOfImpact& t) -> nb::object { return met(t) ? nb::cast(getter(t.impact)) : nb::none(); },
       sig, doc);
+}
+
+void define_times_of_impact(nb::module_& m) {
+  nb::class_<TimesOfImpact> cls(
+      m, "TimesOfImpact",
+      R"(The answers of `times_of_impact`: an array for each quantity, with a row for each pair.
+
+`found[i]` is the TimeOfImpact of row i.)");
+  nb::list names;
+  for (Meeting each : kMeetings) names.append(status_name(each));
+  cls.attr("STATUSES") = nb::tuple(names);
+  cls.def_prop_ro(
+      "pairs", [](const TimesOfImpact& found) { return to_numpy(std::span<const IndexPair>(found.pairs)); },
+      nb::rv_policy::move, nb::sig("def pairs(self) -> numpy.typing.NDArray[numpy.int32]"),
+      "(p, 2) indices of the shapes a and b of each row.");
+  cls.def_prop_ro(
+      "status",
+      [](const TimesOfImpact& found) {
+        std::vector<int> codes;
+        for (const Impact& row : found.rows)
+          codes.push_back(static_cast<int>(std::ranges::find(kMeetings, row.status) - kMeetings.begin()));
+        return to_numpy(std::span<const int>(codes));
+      },
+      nb::rv_policy::move, nb::sig("def status(self) -> numpy.typing.NDArray[numpy.int32]"),
+      "(p,) an index into TimesOfImpact.STATUSES, which has the names of TimeOfImpact.status.");
+  define_number(cls, "time", &Impact::time, false, "(p,) s, not later than the first common point; NaN if separated.");
+  define_number(cls, "time_upper", &Impact::time_upper, false, "(p,) s, as in TimeOfImpact; NaN if separated.");
+  define_vector(cls, "normal", &Impact::normal, "(p, 3) unit, from b to a at `time`; NaN if separated.");
+  define_vector(cls, "point", &Impact::point, "(p, 3) m, as in TimeOfImpact; NaN if separated.");
+  define_number(cls, "distance", &Impact::distance, true, "(p,) m, the least distance of the computed poses.");
+  define_number(cls, "distance_time", &Impact::distance_time, true, "(p,) s, when `distance` was seen.");
+  cls.def("__len__", [](const TimesOfImpact& found) { return found.rows.size(); });
+  cls.def(
+      "__getitem__",
+      [](const TimesOfImpact& found, nb::handle row) {
+        const nb::object at = nb::module_::import_("builtins").attr("range")(found.rows.size())[row];
+        return TimeOfImpact{found.rows[nb::cast<size_t>(at)], found.width};
+      },
+      "row"_a, nb::sig("def __getitem__(self, row: typing.SupportsIndex) -> TimeOfImpact"));
+  cls.def("__repr__", [](const TimesOfImpact& found) {
+    const auto separated = std::ranges::count(found.rows, Meeting::kSeparated, &Impact::status);
+    return "TimesOfImpact(" + std::to_string(found.rows.size()) + " pairs, " + std::to_string(separated) +
+           " separated)";
+  });
+  cls.def(
+      "__getstate__",
+      [](nb::handle self) {
+        return nb::make_tuple(self.attr("pairs"), nb::list(self), nb::cast<TimesOfImpact&>(self).width);
+      },
+      nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+  cls.def(
+      "__setstate__",
+      [](TimesOfImpact& self, nb::handle state) {
+        const char* const refusal = "state must be that of times of impact";
+        if (!nb::isinstance<nb::tuple>(state) || nb::len(state) != 3) throw nb::value_error(refusal);
+        TimesOfImpact read{to_pairs(state[0], std::numeric_limits<int>::max()), {}, to_double(state[2], "state")};
+        const nb::object rows = state[1];
+        if (!nb::isinstance<nb::list>(rows) || nb::len(rows) != read.pairs.size()) throw nb::value_error(refusal);
+        for (nb::handle row : rows) {
+          if (!nb::isinstance<TimeOfImpact>(row)) throw nb::value_error(refusal);
+          read.rows.push_back(nb::cast<const TimeOfImpact&>(row).impact);
+        }
+        new (&self) TimesOfImpact(std::move(read));
+      },
+      nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
+  m.def("times_of_impact", &find_many, "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none(),
+        "end_positions"_a.none(), "end_orientations"_a.none(), "pairs"_a.none() = nb::none(), "duration"_a.none() = 1.0,
+        "tolerance"_a.none() = 1e-9, "threads"_a.none() = 1,
+        nb::sig(("def times_of_impact(shapes: " + any_shapes() +
+                 " | Batch, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None, "
+                 "end_positions: numpy.typing.ArrayLike, end_orientations: numpy.typing.ArrayLike | None, pairs: "
+                 "numpy.typing.ArrayLike | None = None, duration: float = 1.0, tolerance: float = 1e-09, threads: int "
+                 "| None = 1) -> TimesOfImpact")
+                    .c_str()),
+        R"(The times of the first common points of many pairs of moving shapes.
+
+The position of each shape moves along a line at a constant velocity. The shape turns at a constant rate the shorter
+way.
+
+Parameters
+----------
+shapes : sequence of shapes, or Batch
+    The k shapes, without poses.
+positions, orientations : (k, 3) and (k, 4) array_like, or (k, 4, 4) array_like and None
+    Poses at time 0, as `overlaps` takes them.
+end_positions, end_orientations : (k, 3) and (k, 4) array_like, or (k, 4, 4) array_like and None
+    Poses at the end of the motion.
+pairs : (p, 2) array_like of int, optional
+    Indices of the shapes of each pair. Default: all pairs that are not separated during the whole motion, sorted. Boxes
+    around the whole motion of each shape tell which pairs are examined.
+duration : float, default 1.0
+    Length of the motion in s.
+tolerance : float, default 1e-9
+    Wanted width of the intervals of times, as a fraction of `duration`.
+threads : int or None, default 1
+    Number of threads. None: one on each core. The number does not change a bit of the results.
+
+Returns
+-------
+TimesOfImpact
+    A row for each pair, as from `time_of_impact`.
+
+Raises
+------
+ValueError
+    If an argument has the wrong shape, a pose is not finite, or `pairs` has a pair of two half-spaces.
+
+Examples
+--------
+>>> from overlapper import Box, Sphere, times_of_impact
+>>> still = [[0, 0, 0, 1]] * 2
+>>> found = times_of_impact([Sphere(0.01), Box([1, 1, 0.001])], [[0, 0, 1], [0, 0, 0]], still,
+...                         [[0, 0, -2], [0, 0, 0]], still)
+>>> found.pairs.tolist(), found.time.round(6).tolist()
+([[0, 1]], [0.329667]))");
+  m.def(
+      "swept_pairs",
+      [](nb::handle shapes_given, nb::handle positions, nb::handle orientations, nb::handle end_positions,
+         nb::handle end_orientations) {
+        const std::vector<Shape> shapes = to_shapes(shapes_given);
+        const PoseRows start = to_poses(positions, orientations, shapes.size()),
+                       end = to_poses(end_positions, end_orientations, shapes.size(), "end_");
+        const auto pairs = unlocked([&] { return swept_pairs(to_bodies(shapes, start, end, 1), 1); });
+        return to_numpy(std::span<const IndexPair>(pairs));
+      },
+      "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none(), "end_positions"_a.none(),
+      "end_orientations"_a.none(),
+      nb::sig(("def swept_pairs(shapes: " + any_shapes() +
+               " | Batch, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike | None, "
+               "end_positions: numpy.typing.ArrayLike, end_orientations: numpy.typing.ArrayLike | None) -> "
+               "numpy.typing.NDArray[numpy.int32]")
+                  .c_str()),
+      "The pairs of shapes whose boxes around the whole motion meet: (p, 2) indices i < j, sorted.");
 }
 
 }  // namespace
@@ -198,6 +434,7 @@ Examples
 >>> hit = time_of_impact(bullet, sheet, ((0, 0, -300), (0, 0, 0)), duration=0.01)
 >>> hit.status, round(hit.time, 9)
 ('impact', 0.003298333))");
+  define_times_of_impact(m);
 }
 
 }  // namespace overlapper::python

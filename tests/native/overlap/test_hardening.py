@@ -33,6 +33,7 @@ from overlapper import (
     penetration_depth,
     random_polytope,
     time_of_impact,
+    times_of_impact,
 )
 
 HANG = 120  # s after which something hangs; nothing here takes a tenth of it
@@ -96,6 +97,9 @@ def answers(seed):
     pairs = _core.candidate_pairs(shapes, positions, orientations)
     found["candidate_pairs"] = pairs
     found["overlaps"] = overlaps(shapes, positions, orientations, tolerance=TOLERANCE, threads=2)
+    ends = np.array(positions) + rng.normal(size=(3, 3))
+    found["times_of_impact"] = times_of_impact(shapes, positions, orientations, ends, orientations, threads=2)
+    found["swept_pairs"] = _core.swept_pairs(shapes, positions, orientations, ends, orientations)
     found["Batch"] = Batch(shapes).overlaps(positions, orientations, pairs, TOLERANCE)
     ellipsoid = Placed(Ellipsoid([0.4, 0.5, 0.6]))
     found["Ellipsoid"] = [overlap(ellipsoid, body, tolerance=TOLERANCE) for body in (a, Placed(points[0]))]
@@ -135,6 +139,7 @@ def test_answers_cover_every_public_name():
         "Overlaps",
         "Shape",
         "TimeOfImpact",
+        "TimesOfImpact",
     }  # what functions return, and a typing alias
     assert {name for name, value in vars(_core).items() if not isinstance(value, type) and name[0] != "_"} <= {
         *used,

@@ -61,7 +61,7 @@ def test_arguments_and_errors_are_those_of_the_core():
 CLASSES = [
     kind for kind in vars(overlapper).values() if isinstance(kind, type) and kind.__module__ == "overlapper._core"
 ]
-FOUND = (overlapper.Overlap, overlapper.Overlaps, overlapper.TimeOfImpact)
+FOUND = (overlapper.Overlap, overlapper.Overlaps, overlapper.TimeOfImpact, overlapper.TimesOfImpact)
 MADE = [kind for kind in CLASSES if kind not in FOUND]  # by users
 ROOM = overlapper.Batch([Sphere(1)])
 CALLS = {
