@@ -41,6 +41,9 @@ FORCE_MEASURES = {
 
 MEASURE_COLUMNS, FORCE_COLUMNS = ([*chain.from_iterable(each.values())] for each in (MEASURES, FORCE_MEASURES))
 
+# The columns of a first overlap between two poses: the part of the motion before it, and its point in the world.
+IMPACT_COLUMNS = ["impact_fraction", *(f"impact_{axis}_m" for axis in "xyz")]
+
 MOST_ROWS = 20  # the most rows that a notebook shows
 
 Columns = dict[str, NDArray[Any] | Sequence[Any]]
@@ -56,7 +59,7 @@ def measures_of(pair: object) -> dict[str, float | None]:
     return row
 
 
-class Tabular(ABC):
+class Rows(ABC):
     """Rows with named columns. A missing number is null; in pandas, it is NaN."""
 
     __slots__ = ()
@@ -113,6 +116,24 @@ class Tabular(ABC):
         frame: polars.DataFrame = _library("polars").DataFrame(self.columns(), nan_to_null=True)
         return frame
 
+    def _repr_html_(self) -> str:
+        """The first rows, as notebooks show a table."""
+        columns = self.columns()
+        count = len(next(iter(columns.values())))
+        shown = range(min(count, MOST_ROWS))
+        rows = ["".join(f"<th>{name}</th>" for name in columns)]
+        rows += ["".join(f"<td>{_cell(values[i])}</td>" for values in columns.values()) for i in shown]
+        more = f"<p>{count - MOST_ROWS:,} more</p>" if count > MOST_ROWS else ""
+        return (
+            f"<p>{type(self).__name__}, {count:,}</p><table>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>{more}"
+        )
+
+
+class Tabular(Rows):
+    """Rows with volumes and depths, which can be drawn."""
+
+    __slots__ = ()
+
     def plot(self, most: int = 8) -> NDArray[Any]:
         """Draw the depth, volume and force of the pairs as bars.
 
@@ -138,18 +159,6 @@ class Tabular(ABC):
             Without matplotlib.
         """
         return of_a_moment(self.columns(), most)
-
-    def _repr_html_(self) -> str:
-        """The first rows, as notebooks show a table."""
-        columns = self.columns()
-        count = len(next(iter(columns.values())))
-        shown = range(min(count, MOST_ROWS))
-        rows = ["".join(f"<th>{name}</th>" for name in columns)]
-        rows += ["".join(f"<td>{_cell(values[i])}</td>" for values in columns.values()) for i in shown]
-        more = f"<p>{count - MOST_ROWS:,} more</p>" if count > MOST_ROWS else ""
-        return (
-            f"<p>{type(self).__name__}, {count:,}</p><table>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>{more}"
-        )
 
 
 def _cell(value: Any) -> str:

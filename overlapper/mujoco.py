@@ -13,6 +13,7 @@ Shapes and pair rules are read once, poses at every step. pybullet is not needed
 """
 
 from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.first_overlaps import FirstOverlap, FirstOverlaps
 from overlapper.simulation.forces.contact import VolumetricContact
 from overlapper.simulation.forces.forces import Forces
 from overlapper.simulation.forces.pads import TaxelGrid, Taxels
@@ -24,6 +25,8 @@ from overlapper.simulation.mujoco.contact import GeomContact
 __all__ = [
     "Bodies",
     "Contacts",
+    "FirstOverlap",
+    "FirstOverlaps",
     "Forces",
     "GeomContact",
     "LinkContact",

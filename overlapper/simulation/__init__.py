@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         UnsettledWarning,
     )
     from overlapper.simulation.contacts import Contact, Contacts
+    from overlapper.simulation.first_overlaps import FirstOverlap, FirstOverlaps
     from overlapper.simulation.forces.contact import VolumetricContact
     from overlapper.simulation.forces.forces import Forces
     from overlapper.simulation.forces.pads import TaxelGrid, Taxels
@@ -40,6 +41,8 @@ __all__ = [
     "Contact",
     "Contacts",
     "Decomposed",
+    "FirstOverlap",
+    "FirstOverlaps",
     "Forces",
     "LinkContact",
     "LinkContacts",
@@ -79,6 +82,7 @@ __getattr__ = lazily(
             "UnknownBodyWarning",
             "UnsettledWarning",
         ),
+        "first_overlaps": ("FirstOverlap", "FirstOverlaps"),
         "forces.contact": ("VolumetricContact",),
         "forces.forces": ("Forces",),
         "forces.pads": ("TaxelGrid", "Taxels"),

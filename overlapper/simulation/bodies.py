@@ -12,11 +12,12 @@ from typing import Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Overlaps, Placed, Shape, _core, overlaps
+from overlapper import Overlaps, Placed, Shape, _core, overlap, overlaps, times_of_impact
 from overlapper.simulation.asked_pairs import Among, AskedPairs, Numbered, Who, listed
 from overlapper.simulation.cautions import SkippedShapeWarning
 from overlapper.simulation.collision_rules import Mask, Rules, partners
 from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.first_overlaps import FirstOverlap, FirstOverlaps, Moment
 from overlapper.simulation.ground import Grounds
 from overlapper.simulation.layout import Layout, Pose
 from overlapper.simulation.mechanics import Mechanics
@@ -47,8 +48,11 @@ class AnyBodies:
         self._asked: Literal["simulated", "all"] | int = "simulated"
         self._found = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
         self._last: tuple[Contacts, Layout, partial[Mask]] | None = None
+        self._measured: Array | None = None  # the positions of the last overlaps()
         self._arrange()
         self._refresh(stacklevel=4)
+        self._before: Moment | None = None  # the update before the last one
+        self._now = Moment.of(self._layout, self._grounds.links)
 
     def update(self) -> None:
         """Read the shapes of new bodies and changed filters, then all poses. Call it once per step.
@@ -56,6 +60,7 @@ class AnyBodies:
         A base that has not moved since the last update is asked whether it has become static (mass 0).
         """
         self._refresh(stacklevel=3)
+        self._before, self._now = self._now, Moment.of(self._layout, self._grounds.links)
 
     def follow(self) -> None:
         """Read all poses of the bodies known at the last `update()`. Bodies that come or go are not noticed."""
@@ -109,9 +114,72 @@ class AnyBodies:
             self._found = layout.batch.overlaps(
                 layout.positions, layout.orientations, self.pairs(among), tolerance, threads, method, separated=False
             )
+        self._measured = layout.positions
         contacts = Contacts(layout.key_rows, self._found, self._names, self._source.contact)
         self._last = contacts, layout, partial(self._pairs.chosen, among=among, rules=self._rules)
         return contacts
+
+    def first_overlaps(
+        self, pairs: Among = "simulated", threads: int | None = 1, tolerance: float = 1e-9
+    ) -> FirstOverlaps:
+        """Pairs of shapes that met, or passed through each other, between the poses of the last two updates.
+
+        This is continuous collision detection: it finds a bullet that is in front of a sheet at one update and behind
+        the sheet at the next. Between the two poses, the position of each shape moves along a line at a constant
+        velocity, and the shape turns at a constant rate the shorter way. Call `update()` once per step: the motion of
+        several steps is not along lines. A reset of a pose between two updates counts as a motion, so call `update()`
+        after the reset, too.
+
+        Pairs that overlap or touch at the first of the two poses are left out, as `overlaps()` there has them. Bodies
+        that came between the two updates are left out, too. Prisms of height fields are those near shapes at the end.
+
+        Parameters
+        ----------
+        pairs : {'simulated', 'all'} or list of pairs, default 'simulated'
+            The pairs to examine, as in `pairs`.
+        threads : int or None, default 1
+            Number of threads. None: one on each core.
+        tolerance : float, default 1e-9
+            Wanted width of the interval of times, as a fraction of the motion.
+
+        Returns
+        -------
+        FirstOverlaps
+            Sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB). `tunnelled` are those that are separated again at
+            the end.
+
+        Raises
+        ------
+        ValueError
+            If `update()` was not called yet, or `pairs` names a body or a link that is not in the simulation.
+        """
+        if self._before is None:
+            raise ValueError("first_overlaps() needs the poses of two updates: call update() after a step first")
+        asked: Numbered = pairs if isinstance(pairs, str) else self._asked_for(pairs)
+        before, now = self._before, self._now
+        layout = now.layout
+        start, turned, known = now.begun(before)
+        end = now.positions, now.orientations
+        moves = (start != end[0]).any(axis=1) | (turned != end[1]).any(axis=1)
+        examined = _core.swept_pairs(layout.batch, start, turned, *end)
+        first, second = examined.T
+        examined = examined[known[first] & known[second] & (moves[first] | moves[second])]
+        examined = examined[self._pairs.chosen(examined, asked, self._rules)]
+        if self._measured is before.positions and before.layout is layout:
+            examined = examined[~np.isin(_codes(examined), _codes(self._found.pairs))]
+        found = times_of_impact(layout.batch, start, turned, *end, examined, tolerance=tolerance, threads=threads)
+        met: list[FirstOverlap] = []
+        for row, (a, b) in enumerate(examined.tolist()):
+            impact = found[row]
+            status, time, point, normal = impact.status, impact.time, impact.point, impact.normal
+            if status == "separated" or status == "overlapping" or impact.time_upper == 0:
+                continue
+            assert time is not None and point is not None and normal is not None
+            both = (Placed(layout.shapes[i], end[0][i], end[1][i]) for i in (a, b))
+            apart = overlap(*both).status == "separated"
+            (bodyA, linkA, shapeA), (bodyB, linkB, shapeB) = layout.keys[a], layout.keys[b]
+            met.append(FirstOverlap(bodyA, linkA, shapeA, bodyB, linkB, shapeB, status, time, point, normal, apart))
+        return FirstOverlaps(met, self._names)
 
     def pairs(self, among: Among = "simulated") -> NDArray[np.int32]:
         """Pairs of shapes whose bounding boxes meet.
@@ -396,3 +464,8 @@ class AnyBodies:
         """Place all bodies. Returns the bodies without a usable pose."""
         nowhere = self._layout.pose()
         return nowhere | self._left_out.pose() if self._nowhere else nowhere
+
+
+def _codes(pairs: NDArray[np.int32]) -> NDArray[np.int64]:
+    """A number for each pair."""
+    return np.asarray(pairs[:, 0] * np.int64(2**32) + pairs[:, 1])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -66,6 +66,11 @@ class Grounds:
         self._shapes: list[Shape] = []
         self._meets: dict[LinkKey, Mask] = {}
         self._rules: Rules | None = None  # those by which `_meets` was found
+
+    @property
+    def links(self) -> Iterable[LinkKey]:
+        """(body, link) of each height field."""
+        return self._below.keys()
 
     def follow(self, layout: Layout, bodies: Mapping[int, ModelledBody]) -> None:
         """Follow a new layout, after bodies have come or gone."""
