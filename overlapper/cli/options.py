@@ -123,6 +123,11 @@ def simulated(
     return Simulated(given_parameters(given), steps, contact)
 
 
+BetweenOption = Annotated[
+    bool,
+    typer.Option("--between", help="Find pairs that passed through each other between two steps, and when they met."),
+]
+
 LeastDepthOption = Annotated[
     float, typer.Option(min=0.0, help="Ignore overlaps with a depth below this, in m.", show_default=False)
 ]

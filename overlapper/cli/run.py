@@ -12,6 +12,7 @@ import typer
 
 from overlapper.cli.figures import show
 from overlapper.cli.options import (
+    BetweenOption,
     SceneArgument,
     Simulated,
     Written,
@@ -39,6 +40,7 @@ def run(
     files: Written,
     asked: Asking,
     modelled: Modelling,
+    between: BetweenOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
     """Simulate a scene and measure the overlaps of its bodies in every step.
@@ -64,10 +66,12 @@ def run(
     [bold]overlapper run peg_in_hole --contact volumetric --out peg.csv[/bold]  with contact forces in the table
 
     [bold]overlapper run kuka_jenga --check fcl --json[/bold]  compared with FCL, as JSON
+
+    [bold]overlapper run my_scene.py --between[/bold]  with pairs that passed through each other between two steps
     """
     written: list[Path] = []
     try:
-        chosen, summary, finished = _measure(scene, simulated, files, asked, modelled, written)
+        chosen, summary, finished = _measure(scene, simulated, files, asked, modelled, between, written)
     except Refused as refused:
         kept = f"; the steps before are in {' and '.join(map(str, written))}" if written else ""
         raise Refused(f"{refused}{kept}") from refused
@@ -77,6 +81,7 @@ def run(
             "contact": simulated.contact or chosen.contact,
             "per": files.per,
             "check": files.check,
+            "between": between,
         }
         told = {"settings": settings, "parameters": chosen.parameters}
         print(json.dumps(told | summary.as_dict() | {"finished": finished} | places))
@@ -92,6 +97,7 @@ def _measure(
     files: Written,
     asked: Asking,
     modelled: Modelling,
+    between: bool,
     written: list[Path],
 ) -> tuple[Scene, Summary, bool]:
     """The scene, its summary, and False if the run was interrupted: then the summary ends with the last step.
@@ -124,9 +130,10 @@ def _measure(
                 files.per,
                 check,
                 contact == "volumetric",
+                between=between,
             )
         )
-        frames = stack.enter_context(closing(frames_of(scene, steps, asked, modelled, contact)))
+        frames = stack.enter_context(closing(frames_of(scene, steps, asked, modelled, contact, between=between)))
         try:
             for frame in with_progress(frames, scene.name, steps):
                 take(frame)

@@ -52,6 +52,7 @@ def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
 def remarks(summary: Summary, limit: int = 10) -> list[str]:
     """The lines below the table: what was modelled, what was not, and the first `limit` disagreements."""
     lines = str(summary.report).splitlines() if summary.report else []
+    lines += _between_lines(summary, limit)
     lines += skipped_lines(summary.skipped)
     lines += [_decomposed(each) for each in summary.decomposed]
     if summary.verdicts:
@@ -64,6 +65,24 @@ def remarks(summary: Summary, limit: int = 10) -> list[str]:
     if len(summary.disagreements) > limit:
         rest = len(summary.disagreements) - limit
         lines.append(f"  and {rest:,} more, each explained in the table of --out and in the output of --json.")
+    return lines
+
+
+def _between_lines(summary: Summary, limit: int) -> list[str]:
+    """The lines on pairs that met between two steps."""
+    if not summary.between:
+        return []
+    found, rest = summary.tunnelled, len(summary.tunnelled) - limit
+    pairs = "one pair" if len(found) == 1 else f"{len(found):,} pairs"
+    lines = [f"Tunnelled: {pairs} of links passed through each other within a step."]
+    for each in found[:limit]:
+        at = ", ".join(f"{part:.4g}" for part in each.point)
+        names = " – ".join(map(printable, each.names))
+        lines.append(f"  step {each.step}, {names}: they met after {each.fraction:.4g} of the step, at {at} m")
+    if rest > 0:
+        lines.append(f"  and {rest:,} more, each in the table of --out and in the output of --json.")
+    if summary.undecided:
+        lines.append(f"Undecided: for {summary.undecided:,} pairs of shapes it is not known when they met in a step.")
     return lines
 
 

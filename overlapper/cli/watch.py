@@ -17,6 +17,7 @@ import typer
 
 from overlapper.cli.figures import show
 from overlapper.cli.options import (
+    BetweenOption,
     Written,
     asking,
     files,
@@ -56,6 +57,7 @@ def watch(
     files: Written,
     asked: Asking,
     modelled: Modelling,
+    between: BetweenOption = False,
     direct: Annotated[
         bool,
         typer.Option("--direct", help="Replace pybullet.GUI by pybullet.DIRECT, so that the script opens no window."),
@@ -78,12 +80,17 @@ def watch(
 
     [bold]overlapper watch --name 1=gripper --name 2=cup my_script.py[/bold]  with names of your own
 
+    [bold]overlapper watch --between my_script.py[/bold]  with pairs that passed through each other between two steps
+
     [bold]overlapper watch --direct my_script.py[/bold]  a script that opens a window, on a machine without a screen
     """
     if not script.is_file():
         raise Refused(f"there is no script {script}")
     asked = replace(asked, pairs=asked.pairs or "simulated")
     how = {"every": every, "rate": rate, **settings_of(asked, modelled), "per": files.per, "check": files.check}
+    how["between"] = between
+    if between and every > 1:
+        raise Refused("--between needs every step, so it does not go with --every")
     how["names"] = _named(names or ())
     try:
         from overlapper.reference import reference

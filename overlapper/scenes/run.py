@@ -25,10 +25,12 @@ def run(
     modelling: Modelling = Modelling(),  # noqa: B008
     contact: ContactModel | None = None,
     only: Container[int] | None = None,
+    between: bool = False,
 ) -> Generator[Frame[AnyBodies], None, None]:
     """Build the scene in a new simulation and step it, `scene.steps` times by default.
 
-    Every step is a frame, and the first frame has number 1. With `only`, only the steps in it are frames. `contact`
+    Every step is a frame, and the first frame has number 1. With `only`, only the steps in it are frames. With
+    `between`, which takes no `only`, frames have the first overlaps since the step before. `contact`
     chooses the contact forces: the name of the scene's engine, or "volumetric" for a `VolumetricContact` of the pairs
     that the simulator lets collide. By default the scene chooses `contact`, and also the pairs that are measured.
     SceneError if the scene fails or cannot be measured, ValueError if `contact` is invalid.
@@ -54,7 +56,8 @@ def run(
                 bodies.update()
                 contacts = bodies.overlaps(**asked)
                 forces = None if volumetric is None else volumetric.mean()
-                yield Frame(i + 1, (i + 1) * seconds, bodies, contacts, forces)
+                first = bodies.first_overlaps(asked["pairs"]) if between else None
+                yield Frame(i + 1, (i + 1) * seconds, bodies, contacts, forces, first)
     except Unreadable as error:
         raise SceneError(f"the scene {scene.path} cannot be read: {error}") from error
     except ValueError as error:

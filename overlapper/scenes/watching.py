@@ -26,6 +26,7 @@ from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.cautions import SkippedShapeWarning, UnknownBodyWarning
 from overlapper.simulation.engine import LIBRARIES, Happening, engine_that_has
 from overlapper.simulation.engine import engine as engine_of
+from overlapper.simulation.first_overlaps import FirstOverlaps
 from overlapper.simulation.imports import when_imported
 from overlapper.simulation.settings import Asking, Concave, Method, Modelling, Surface, settings_of
 from overlapper.tables.frame import Frame
@@ -88,6 +89,9 @@ class Watch:
         A row of the table is a pair of shapes, or a pair of whole links.
     check : {'fcl', 'mujoco'}, optional
         Compare every pair with FCL, or with the answer of MuJoCo itself, if MuJoCo runs the simulation.
+    between : bool, default False
+        Find pairs that passed through each other between two steps, as `Bodies.first_overlaps` does. It needs every
+        step. A reset of a pose between two steps counts as a motion.
     recorder : Recorder, optional
         A recorder that was set up earlier.
     names : dict of int to str, optional
@@ -123,6 +127,7 @@ class Watch:
         method: Method = "auto",
         per: Per = "shape",
         check: By | None = None,
+        between: bool = False,
         recorder: Recorder | None = None,
         names: Mapping[int, str] | None = None,
         name: str = "the simulation",
@@ -134,6 +139,8 @@ class Watch:
             raise ValueError(f"every must be a number of steps from 1, not {every}")
         if not (isinstance(rate, (int, float)) and 0 < rate < math.inf):
             raise ValueError(f"rate must be a number of measurements a second above 0, not {rate!r}")
+        if between and every > 1:
+            raise ValueError(f"between needs every step, so every must be 1, not {every}")
         if per not in get_args(Per):
             raise ValueError(f"per must be 'shape' or 'link', not {per!r}")
         self._modelling = Modelling(concave, concave_threshold, surface)
@@ -152,7 +159,7 @@ class Watch:
         self.written: list[Path] = []
         """The files that were written, known when the watch is over."""
         self.open = True
-        self._names = names
+        self._names, self._between = names, between
         self._met: set[int] = set()  # the bodies of all measured steps, if there are names
         self._check = reference(check)
         if self._check and self._check.by == "mujoco" != engine:
@@ -236,15 +243,17 @@ class Watch:
             for kind in (SkippedShapeWarning, UnknownBodyWarning):
                 warnings.filterwarnings("ignore", category=kind, module=rf"{__name__}$")
             self._bodies = self._simulation.bodies(**settings_of(self._modelling), names=self._names)
+            first = FirstOverlaps() if self._between else None  # poses before the first step are unknown
         else:
             self._bodies.update()
+            first = self._bodies.first_overlaps(self._asking.pairs or "simulated") if self._between else None
         if self._names:
             self._met.update(self._bodies.labels)
         contacts = self._bodies.overlaps(**settings_of(self._asking))
         with interrupted_later():
             if self._take is None:
                 self._take = self._begun(self._bodies)
-            self._take(Frame(self.steps, self.time, self._bodies, contacts))
+            self._take(Frame(self.steps, self.time, self._bodies, contacts, first=first))
             self.measured += 1
             if self.out:  # else nothing can be drawn, and memory should not grow with the steps
                 self._moments[0].append(self.steps)
@@ -263,6 +272,7 @@ class Watch:
             self._per,
             self._check,
             growing=self._growing,
+            between=self._between,
         )
         return self._files.enter_context(files)
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from overlapper.columns import Tabular
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.first_overlaps import FirstOverlaps
 from overlapper.tables.outputs import StepTable
 from overlapper.tables.table_chart import drawn
 from overlapper.tables.table_file import origin
@@ -48,6 +49,8 @@ class Log:
         A row is a pair of shapes, or a pair of whole links.
     forces : bool, default False
         Whether the table has columns for the forces that `add` takes.
+    between : bool, default False
+        Whether the table has columns for the first overlaps that `add` takes.
     **settings : Any
         Further entries of the heading, as in Log("run.csv", bodies, tolerance=1e-6, mu=0.5).
 
@@ -70,6 +73,7 @@ class Log:
         *,
         per: Literal["shape", "link"] = "shape",
         forces: bool = False,
+        between: bool = False,
         **settings: Any,
     ) -> None:
         if not isinstance(path, (str, PathLike)):
@@ -81,14 +85,19 @@ class Log:
         """The number of the last step added."""
         self.unfinished: Path | None = None
         """Where the rows are that an error has kept from their place, if there are any."""
-        self._bodies, self._forces = bodies, forces
+        self._bodies, self._forces, self._between = bodies, forces, between
         self._moments = array("q"), array("d")
         self._written: Path | None = None
         heading = origin(bodies.engine) | bodies.settings | settings
-        self._table: StepTable | None = StepTable(Path(path), heading, per, forces)
+        self._table: StepTable | None = StepTable(Path(path), heading, per, forces, between=between)
 
     def add(
-        self, contacts: Contacts, step: int | None = None, time: float | None = None, forces: Forces | None = None
+        self,
+        contacts: Contacts,
+        step: int | None = None,
+        time: float | None = None,
+        forces: Forces | None = None,
+        first: FirstOverlaps | None = None,
     ) -> None:
         """Write the contacts of a step. Call it before the next `bodies.update()`.
 
@@ -103,6 +112,9 @@ class Log:
         forces : Forces, optional
             Forces between these bodies, as `VolumetricContact.mean()` returns them. Pairs without forces have empty
             cells.
+        first : FirstOverlaps, optional
+            Pairs that met since the step before, as `bodies.first_overlaps()` returns them. Pairs that passed through
+            each other get rows with the status "tunnelled".
 
         Raises
         ------
@@ -110,7 +122,7 @@ class Log:
             If `contacts` is something else.
         ValueError
             If `step` is not larger than the last one, `time` is not finite, or `contacts` are of other bodies. Also if
-            there are `forces` but no columns for them, or if the log is closed.
+            there are `forces` or `first` but no columns for them, or if the log is closed.
         OSError
             If the rows cannot be written.
         """
@@ -122,6 +134,10 @@ class Log:
             raise ValueError("this Log has no columns for forces: make it with Log(..., forces=True)")
         if forces is not None and not isinstance(forces, Tabular):
             raise TypeError(f"forces must be what VolumetricContact.mean() returns, not {forces!r}")
+        if first is not None and not self._between:
+            raise ValueError("this Log has no columns for first overlaps: make it with Log(..., between=True)")
+        if first is not None and not isinstance(first, FirstOverlaps):
+            raise TypeError(f"first must be what Bodies.first_overlaps() returns, not {first!r}")
         step = self.steps + 1 if step is None else whole(step, "step")
         if step <= self.steps:
             raise ValueError(f"step must be larger from one add() to the next: {step} came after {self.steps}")
@@ -129,11 +145,12 @@ class Log:
             time = step * self._bodies.time_step
         if not (isinstance(time, Real) and math.isfinite(time)):
             raise ValueError(f"time must be a finite number of seconds, not {time!r}")
-        strange = {key for row in contacts.keys.tolist() for key in (tuple(row[:3]), tuple(row[3:]))}
+        used = [*contacts.keys.tolist(), *(each.key for each in first or ())]
+        strange = {key for row in used for key in (tuple(row[:3]), tuple(row[3:]))}
         if strange := strange.difference(self._bodies.keys):
             body, link, shape = min(strange)
             raise ValueError(f"contacts has shape {shape} of link {link} of body {body}, which is not among the bodies")
-        self._table.add(step, time, self._bodies, contacts, forces=forces)
+        self._table.add(step, time, self._bodies, contacts, forces=forces, first=first)
         self.steps = step
         for each, value in zip(self._moments, (step, time)):
             each.append(value)

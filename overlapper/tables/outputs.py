@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from overlapper import Overlaps
 from overlapper.simulation.links import link_contacts
 from overlapper.tables.summary import Summary
-from overlapper.tables.table import COLUMNS, FORCES, MUJOCO, link_rows, rows
+from overlapper.tables.table import COLUMNS, FORCES, IMPACTS, MUJOCO, link_rows, rows
 from overlapper.tables.table_file import LEFT_OUT, TABLES, must_be_a_table
 from overlapper.whole_file import must_be_writable, unfinished
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from overlapper.reference import By, Comparison, Reference
     from overlapper.simulation.bodies import AnyBodies
     from overlapper.simulation.contacts import Contacts
+    from overlapper.simulation.first_overlaps import FirstOverlaps
     from overlapper.simulation.forces.forces import Forces
     from overlapper.simulation.model import Skipped
     from overlapper.tables.frame import Frame
@@ -49,14 +50,20 @@ def can_be_written(out: Path | None, html: Path | None, *others: Path | None) ->
 class StepTable:
     """A table of overlaps that grows by the rows of each step. Its heading has the `settings`.
 
-    `per` says whether a row is about two shapes or two links as a whole. `forces` says whether there are columns of
-    forces, too. `check` names the program that is asked about each pair. ValueError for a name with an ending that is
-    not in TABLES. OSError if the file cannot be made.
-    ImportError without the library that writes it.
+    `per` says whether a row is about two shapes or two links as a whole. `forces` and `between` say whether there are
+    columns of forces and of first overlaps between steps, too. `check` names the program that is asked about each pair.
+    ValueError for a name with an ending that is not in TABLES. OSError if the file cannot be made. ImportError without
+    the library that writes it.
     """
 
     def __init__(
-        self, path: Path, settings: Mapping[str, Any], per: Per = "shape", forces: bool = False, check: By | None = None
+        self,
+        path: Path,
+        settings: Mapping[str, Any],
+        per: Per = "shape",
+        forces: bool = False,
+        check: By | None = None,
+        between: bool = False,
     ) -> None:
         must_be_a_table(path)
         if per not in ("shape", "link"):
@@ -65,6 +72,7 @@ class StepTable:
         self._left_out: dict[Skipped, int] = {}
         texts = {name: str(value) for name, value in settings.items()}
         columns = COLUMNS | (MUJOCO if check == "mujoco" else {}) | (FORCES if forces else {})
+        columns |= IMPACTS if between else {}
         self._table = TABLES[path.suffix](path, texts | {"per": per}, columns)
 
     def add(
@@ -75,10 +83,12 @@ class StepTable:
         contacts: Contacts,
         opinions: Sequence[Comparison] = (),
         forces: Forces | None = None,
+        first: FirstOverlaps | None = None,
     ) -> None:
         """Write the rows of a step at once.
 
-        `opinions` are those of FCL or MuJoCo on the same contacts, if it was asked. A body or link that is left out for
+        `opinions` are those of FCL or MuJoCo on the same contacts, if it was asked. `first` are the first overlaps
+        since the step before. A body or link that is left out for
         the first time is metadata from then on.
         """
         for each in bodies.skipped:
@@ -87,9 +97,9 @@ class StepTable:
                 said = f"{each.name} from step {step} on, {each.reason}"
                 self._table.remark(f"{LEFT_OUT}{len(self._left_out)}", said)
         if self._per == "link":
-            self._table.write(link_rows(step, time, bodies, link_contacts(contacts), forces))
+            self._table.write(link_rows(step, time, bodies, link_contacts(contacts), forces, first))
         else:
-            self._table.write(rows(step, time, bodies, contacts, opinions, forces))
+            self._table.write(rows(step, time, bodies, contacts, opinions, forces, first))
 
     @property
     def growing(self) -> Path:
@@ -119,10 +129,12 @@ def outputs(
     check: Reference | None = None,
     forces: bool = False,
     growing: list[Path] | None = None,
+    between: bool = False,
 ) -> Iterator[Callable[[Frame[Any]], None]]:
     """Give a function that takes frames, and writes them to the summary, the table `out` and the page `html`.
 
-    Folders of `out` and `html` are made if they do not exist. The table has columns of `forces`, if frames have any.
+    Folders of `out` and `html` are made if they do not exist. The table has columns of `forces`, if frames have any,
+    and of first overlaps, if frames have those `between` steps.
     `written` gets the files that exist in the end: in their place, or, if the run fails, beside it. `growing` gets the
     file that has the rows of the table until then.
     """
@@ -133,14 +145,14 @@ def outputs(
     with ExitStack() as stack:
         # The page is written last, and checked first.
         record = stack.enter_context(recorder(html, written)) if html else None
-        table = stack.enter_context(_table(out, settings, per, forces, check, written)) if out else None
+        table = stack.enter_context(_table(out, settings, per, forces, check, written, between)) if out else None
         if table and growing is not None:
             growing.append(table.growing)
 
         def take(frame: Frame[Any]) -> None:
             opinions = check.compare_contacts(frame.bodies, frame.contacts) if check else []
             if table:
-                table.add(frame.step, frame.time, frame.bodies, frame.contacts, opinions, frame.forces)
+                table.add(frame.step, frame.time, frame.bodies, frame.contacts, opinions, frame.forces, frame.first)
             summary.add(frame, opinions)
             if record:
                 record(frame)
@@ -150,13 +162,19 @@ def outputs(
 
 @contextmanager
 def _table(
-    path: Path, settings: Mapping[str, Any], per: Per, forces: bool, check: Reference | None, written: list[Path]
+    path: Path,
+    settings: Mapping[str, Any],
+    per: Per,
+    forces: bool,
+    check: Reference | None,
+    written: list[Path],
+    between: bool,
 ) -> Iterator[StepTable]:
     """Give a table to be written.
 
     It is named in `written` if it has rows, or if the run came to its end.
     """
-    table = StepTable(path, settings, per, forces, check.by if check else None)
+    table = StepTable(path, settings, per, forces, check.by if check else None, between)
     try:
         yield table
     except BaseException as error:
@@ -174,7 +192,8 @@ def recorder(
 ) -> Iterator[Callable[[Frame[Any]], None]]:
     """Give a function that records some of the frames it is called with, and write the page in the end.
 
-    It records `rate` frames per second and, so that no pair is missing, each first frame in which a pair overlaps.
+    It records `rate` frames per second and, so that no pair is missing, each first frame in which a pair overlaps, and
+    each frame in which a pair has tunnelled.
     After an error, the frames recorded until then are beside the page and named in `written`. Otherwise the page is
     named there. Without a frame, nothing is written.
     """
@@ -190,8 +209,8 @@ def recorder(
         found = frame.contacts
         overlapping = set(map(tuple, found.keys[found.overlaps.status == Overlaps.OVERLAPPING].tolist()))
         due = frame.time * rate >= shown
-        if due or not overlapping <= met:
-            recording.add(frame.bodies, found, frame.time, forces=frame.forces)
+        if due or not overlapping <= met or (frame.first and frame.first.tunnelled):
+            recording.add(frame.bodies, found, frame.time, forces=frame.forces, first=frame.first or ())
             met.update(overlapping)
             shown += due
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from overlapper.reference import By, Comparison
     from overlapper.simulation import Decomposed, Report, Skipped
     from overlapper.simulation.bodies import AnyBodies
+    from overlapper.simulation.first_overlaps import FirstOverlaps
     from overlapper.tables.frame import Frame
     from overlapper.tables.still import Still
 
@@ -110,6 +111,16 @@ class Disagreement:
     explanation: str
 
 
+@dataclass(frozen=True, slots=True)
+class Tunnelled:
+    """Two links that passed through each other within a step. `fraction` is the part of the step before they met."""
+
+    step: int
+    names: tuple[str, str]
+    fraction: float
+    point: tuple[float, ...]
+
+
 @dataclass(slots=True)
 class Summary:
     """The frames of a run, added one by one.
@@ -138,6 +149,12 @@ class Summary:
         Whether there were forces of volumetric contact.
     check : {'fcl', 'mujoco'}, default 'fcl'
         The program whose verdicts these are.
+    between : bool, default False
+        Whether first overlaps between steps were asked for.
+    tunnelled : list of Tunnelled
+        The pairs of links that passed through each other within a step.
+    undecided : int, default 0
+        Number of pairs of shapes whose first overlap was not decided.
     """
 
     scene: str
@@ -151,6 +168,9 @@ class Summary:
     disagreements: list[Disagreement] = field(default_factory=list)
     forces: bool = False
     check: By = "fcl"
+    between: bool = False
+    tunnelled: list[Tunnelled] = field(default_factory=list)
+    undecided: int = 0
 
     def add(self, frame: Frame[AnyBodies], opinions: Sequence[Comparison] = ()) -> None:
         """Add a frame.
@@ -171,10 +191,23 @@ class Summary:
         for links, pair, force in overlapping_links(frame):
             known = self.pairs.setdefault(links, PairSummary((names[links[:2]], names[links[2:]])))
             known.add(frame.step, pair, force)
+        if frame.first is not None:
+            self.between = True
+            self._add_first(frame.step, frame.first, names)
         for contact, opinion in zip(frame.contacts, opinions):
             self._add_opinion(
                 frame.step, (names[contact.bodyA, contact.linkA], names[contact.bodyB, contact.linkB]), opinion
             )
+
+    def _add_first(self, step: int, first: FirstOverlaps, names: dict[tuple[int, int], str]) -> None:
+        self.undecided += sum(each.status == "open" for each in first)
+        seen: set[Links] = set()
+        for each in sorted(first.tunnelled, key=lambda each: each.fraction):
+            links = each.bodyA, each.linkA, each.bodyB, each.linkB
+            if links not in seen:
+                seen.add(links)
+                both = names[links[:2]], names[links[2:]]
+                self.tunnelled.append(Tunnelled(step, both, each.fraction, tuple(map(float, each.point))))
 
     def _add_opinion(self, step: int, names: tuple[str, str], opinion: Comparison) -> None:
         self.verdicts[opinion.verdict] += 1
@@ -224,6 +257,8 @@ class Summary:
                 asdict(each) | {"shapes": [*each.shapes], "path": str(each.path) if each.path else None}
                 for each in self.decomposed
             ],
+            **({"tunnelled": [asdict(each) for each in self.tunnelled]} if self.between else {}),
+            **({"undecided": self.undecided} if self.between else {}),
             self.check: dict(self.verdicts),
             "disagreements": [asdict(each) for each in self.disagreements],
         }

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.columns import FORCE_COLUMNS, MEASURE_COLUMNS, measures_of
+from overlapper.columns import FORCE_COLUMNS, IMPACT_COLUMNS, MEASURE_COLUMNS, measures_of
 
 if TYPE_CHECKING:
     from overlapper.reference import Comparison
     from overlapper.simulation.contacts import Contact
+    from overlapper.simulation.first_overlaps import FirstOverlap, FirstOverlaps
     from overlapper.simulation.forces.forces import Forces
     from overlapper.simulation.links import LinkContact
 
@@ -44,6 +45,12 @@ MUJOCO: dict[str, type] = {"mujoco": str, "mujoco_explanation": str}
 
 # The further columns of a run with volumetric contact. They are empty for a pair that it does not push apart.
 FORCES: dict[str, type] = dict.fromkeys(FORCE_COLUMNS, float)
+
+# The further columns of a run with first overlaps. They are empty for a pair that has met in an earlier step.
+IMPACTS: dict[str, type] = dict.fromkeys(IMPACT_COLUMNS, float)
+
+# The status of a row whose shapes met within the step, but are separated at both ends of the step.
+TUNNELLED = "tunnelled"
 
 
 class PosedBodies(Protocol):
@@ -105,12 +112,15 @@ def rows(
     contacts: Sequence[Contact],
     opinions: Sequence[Comparison] = (),
     forces: Forces | None = None,
+    first: FirstOverlaps | None = None,
 ) -> list[Row]:
     """Return the rows of one step.
 
     `opinions` are those of FCL or MuJoCo on the same contacts, if it was asked. `forces` are the forces between them.
+    `first` are the first overlaps since the step before. Pairs that have tunnelled have rows behind the others.
     """
     pushed = _pushed(forces)
+    met = {each.key: each for each in first or ()}
     a, b = placements(bodies, "A"), placements(bodies, "B")
     table: list[Row] = []
     for k, contact in enumerate(contacts):
@@ -126,16 +136,32 @@ def rows(
                 "fcl_explanation": None,
                 **(_opinion(opinions[k]) if opinions else {}),
                 **pushed.get(_key(contact), {}),
+                **_impact(met.get(_key(contact))),
             }
         )
+    for each in first.tunnelled if first else ():
+        where = {**a[each.key[:3]], **b[each.key[3:]]}
+        table.append({"step": step, "time_s": float(time), **where, **_through(each)})
     return table
+
+
+def _impact(first: FirstOverlap | None) -> Row:
+    """Return the columns of IMPACTS."""
+    return dict(zip(IMPACTS, [first.fraction, *map(float, first.point)])) if first else {}
+
+
+def _through(first: FirstOverlap) -> Row:
+    """Return the status and the measures of a pair that has tunnelled. It shares nothing at the step's own poses."""
+    measures: Row = {name: None if name.startswith("centroid") else 0.0 for name in MEASURE_COLUMNS}
+    normal = {f"normal_{axis}": float(part) + 0.0 for axis, part in zip("xyz", first.normal)}
+    return {"status": TUNNELLED, **measures, **normal, **_impact(first)}
 
 
 def _opinion(opinion: Comparison) -> Row:
     return {opinion.by: opinion.verdict, f"{opinion.by}_explanation": opinion.explanation}
 
 
-def _key(contact: Contact) -> tuple[int, ...]:
+def _key(contact: Contact) -> tuple[int, int, int, int, int, int]:
     return contact.bodyA, contact.linkA, contact.shapeA, contact.bodyB, contact.linkB, contact.shapeB
 
 
@@ -148,32 +174,44 @@ def _pushed(forces: Forces | None) -> dict[tuple[int, ...], Row]:
 
 
 def link_rows(
-    step: int, time: float, bodies: PosedBodies, pairs: Sequence[LinkContact], forces: Forces | None = None
+    step: int,
+    time: float,
+    bodies: PosedBodies,
+    pairs: Sequence[LinkContact],
+    forces: Forces | None = None,
+    first: FirstOverlaps | None = None,
 ) -> list[Row]:
     """Return the rows of one step for links as a whole.
 
     The columns of single shapes, their poses, area, slip, FCL and MuJoCo, are empty. Forces and energies are sums over
-    the pairs of their shapes. Torques are sums about the centroid of the links.
+    the pairs of their shapes. Torques are sums about the centroid of the links. The first overlap of two links is the
+    earliest one of their shapes.
     """
     names = bodies.names
+    met: dict[tuple[int, int, int, int], FirstOverlap] = {}
+    for each in sorted(first or (), key=lambda each: each.fraction):
+        met.setdefault((each.bodyA, each.linkA, each.bodyB, each.linkB), each)
     at = {} if forces is None else {pair: k for k, pair in enumerate(map(tuple, forces.pairs.tolist()))}
     table: list[Row] = []
+
+    def add(pair: LinkContact | FirstOverlap, values: Row) -> None:
+        who: Row = {
+            "bodyA": pair.bodyA,
+            "linkA": pair.linkA,
+            "nameA": names[pair.bodyA, pair.linkA],
+            "bodyB": pair.bodyB,
+            "linkB": pair.linkB,
+            "nameB": names[pair.bodyB, pair.linkB],
+        }
+        table.append({"step": step, "time_s": float(time), **who, **values})
+
     for pair in pairs:
-        table.append(
-            {
-                "step": step,
-                "time_s": float(time),
-                "bodyA": pair.bodyA,
-                "linkA": pair.linkA,
-                "nameA": names[pair.bodyA, pair.linkA],
-                "bodyB": pair.bodyB,
-                "linkB": pair.linkB,
-                "nameB": names[pair.bodyB, pair.linkB],
-                "status": pair.status,
-                **measures_of(pair),
-                **_sum_of(pair, forces, [at[_key(each)] for each in pair.contacts if _key(each) in at]),
-            }
-        )
+        pushed = _sum_of(pair, forces, [at[_key(each)] for each in pair.contacts if _key(each) in at])
+        impact = _impact(met.pop((pair.bodyA, pair.linkA, pair.bodyB, pair.linkB), None))
+        add(pair, {"status": pair.status, **measures_of(pair), **pushed, **impact})
+    for _, through in sorted(met.items()):
+        if through.tunnelled:
+            add(through, _through(through))
     return table
 
 

@@ -26,10 +26,10 @@ from overlapper import __version__
 from overlapper.install import hint
 from overlapper.printable import first_line, printable
 from overlapper.simulation.engine import LIBRARIES
-from overlapper.tables.table import COLUMNS, FORCES, MUJOCO, POSE, Row, Value
+from overlapper.tables.table import COLUMNS, FORCES, IMPACTS, MUJOCO, POSE, Row, Value
 from overlapper.whole_file import beside, claim, settle
 
-KNOWN = COLUMNS | MUJOCO | FORCES
+KNOWN = COLUMNS | MUJOCO | FORCES | IMPACTS
 
 LEFT_OUT = "left out "  # how the name of metadata begins that says what was not modelled
 

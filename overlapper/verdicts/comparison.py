@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.columns import FORCE_MEASURES, MEASURES
-from overlapper.tables.table import Row, Value, key, poses
+from overlapper.tables.table import TUNNELLED, Row, Value, key, poses
 from overlapper.verdicts.expected import Budget
 
 Names = Mapping[tuple[int, int], str]
@@ -71,10 +71,14 @@ class Differences:
 def compare_measures(
     recorded: Sequence[Row], found: Sequence[Row], budgets: Mapping[str, Budget], names: Names | None = None
 ) -> Differences:
-    """Pairs and statuses must be as recorded, measures within their budgets, and certified errors similar."""
+    """Pairs and statuses must be as recorded, measures within their budgets, and certified errors similar.
+
+    Pairs that have tunnelled between two steps are not compared.
+    """
     names = names or {}
     old, new = (
-        {(_step(row), *key(row)): row for row in rows if row["status"] != "alone"} for rows in (recorded, found)
+        {(_step(row), *key(row)): row for row in rows if row["status"] not in ("alone", TUNNELLED)}
+        for rows in (recorded, found)
     )
     moves: list[Move] = []
     spent = {name: 0.0 for name in MEASURES if name in budgets}

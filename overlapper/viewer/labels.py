@@ -57,6 +57,21 @@ class DrawnContact(Protocol):
     def overlap(self) -> Overlap: ...
 
 
+class Met(Protocol):
+    """Two links, and whether they passed through each other between two steps."""
+
+    @property
+    def bodyA(self) -> int: ...
+    @property
+    def linkA(self) -> int: ...
+    @property
+    def bodyB(self) -> int: ...
+    @property
+    def linkB(self) -> int: ...
+    @property
+    def tunnelled(self) -> bool: ...
+
+
 def must_be_drawn(bodies: object, contacts: object) -> None:
     """TypeError unless these are bodies and a list of contacts."""
     if not hasattr(bodies, "placed"):

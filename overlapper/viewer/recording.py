@@ -30,6 +30,7 @@ from overlapper.viewer.labels import (
     DrawnBodies,
     DrawnContact,
     LinkName,
+    Met,
     Pair,
     body_paths,
     key_of,
@@ -124,6 +125,7 @@ class Recording:
         self._contacts: dict[Pair, DrawnContact] = {}  # the first contact of each pair
         self._presses: list[tuple[float, ...]] = []  # of each sighting
         self._depths: dict[int, float] = {}  # of polytopes
+        self._tunnelled: list[tuple[int, str]] = []  # frame, pair of links
         self._left_out: dict[str, None] = {}  # a sentence for each shape or body that is not modelled in some frame
         self._usual: list[tuple[float, float]] = []  # N and Pa, in each frame that has forces
 
@@ -134,6 +136,7 @@ class Recording:
         time: float,
         name: str = "",
         forces: Forces | None = None,
+        first: Iterable[Met] = (),
     ) -> None:
         """Record the bodies where they are now, with their overlaps.
 
@@ -150,6 +153,8 @@ class Recording:
             times.
         forces : Forces, optional
             Forces to draw.
+        first : iterable of FirstOverlap, default ()
+            First overlaps since the step before. The page names the pairs that have tunnelled.
 
         Raises
         ------
@@ -195,6 +200,10 @@ class Recording:
             press = pressed.get(key_of(contact))
             tops.append(self._add_overlap(self._stage, pair, contact.overlap, press))
             weights.append(float(np.linalg.norm(press.force)) if press else 0.0)
+        for each in first:
+            if each.tunnelled:
+                a, b = (bodies.names[link] for link in ((each.bodyA, each.linkA), (each.bodyB, each.linkB)))
+                self._tunnelled.append((len(self._times) - 1, f"{a} – {b}"))
         if any(weights):
             self._usual.append((usual_force(arrows(bodies, contacts, pressed)), usual(tops, weights)))
 
@@ -251,6 +260,7 @@ class Recording:
             "times": self._times,
             "names": self._names if any(self._names) else None,
             "leftOut": list(self._left_out),
+            "tunnelled": list(dict.fromkeys(self._tunnelled)),
             "pairs": list(self._pairs),
             "links": list(self._links.values()),
             "nodes": list(self._nodes),

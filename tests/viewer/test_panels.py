@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from pages import Scene, coloured, hand_at, looks, opened, panel, recorded, scene, sides
 
 from overlapper import Box, HalfSpace, Placed, Sphere
+from overlapper.simulation.first_overlaps import FirstOverlap
 from overlapper.simulation.model import Skipped
 from overlapper.viewer import Recording
 from overlapper.viewer.look import Look
@@ -446,6 +447,24 @@ def test_framed_bodies_stay_visible_in_a_narrow_window(browser, reach, sized):
     # From farther off, so that both bodies are seen whole: nothing green at the sides.
     assert coloured(narrow[:, :2], "green") == coloured(narrow[:, -2:], "green") == 0
     assert coloured(narrow, "green") / narrow.size > 0.2 * wide
+
+
+def test_the_page_leads_to_pairs_that_passed_through_each_other(browser, tmp_path):
+    recording = Recording()
+    through, stopped = (FirstOverlap(0, -1, 0, 2, -1, 0, "impact", 0.5, None, None, apart) for apart in (True, False))
+    for frame, first in enumerate([(), (through, through), (stopped,), (), (through,)]):
+        bodies = pile(lift=0.005 * frame)
+        recording.add(bodies, bodies.contacts(), time=float(frame), first=first)
+    opened(browser, recording.save(tmp_path / "through.html"))
+    assert text(browser, "#tunnelled") == "2 tunnelled"
+    told = browser.ask("document.getElementById('tunnelled').title").splitlines()
+    assert [line.partition(":")[0] for line in told] == ["1.000 s", "4.000 s"]
+    assert bodies.names[0, -1] in told[0] and bodies.names[2, -1] in told[0]
+    for time in (4, 1, 4):
+        browser.ask("document.getElementById('tunnelled').click()")
+        browser.wait(f"document.querySelector('#time output').textContent === '{time:.3f} s'")
+    opened(browser, recorded([pile()], tmp_path / "none.html"), "#t=0")
+    assert browser.ask("document.getElementById('tunnelled').hidden")
 
 
 def test_the_page_counts_and_names_what_is_not_modelled(browser, tmp_path):

@@ -92,6 +92,11 @@ document.querySelector("#head h1").textContent = film.title;
 byId("left-out").hidden = !film.leftOut.length;
 byId("left-out").textContent = `${film.leftOut.length} not modelled`;
 byId("left-out").title = film.leftOut.join("\n");
+byId("tunnelled").hidden = !film.tunnelled.length;
+byId("tunnelled").textContent = `${film.tunnelled.length} tunnelled`;
+byId("tunnelled").title = film.tunnelled.map(([frame, pair]) => `${times[frame].toFixed(3)} s: ${pair}`).join("\n");
+// The next frame before which a pair has passed through another one.
+byId("tunnelled").onclick = () => pauseAt((film.tunnelled.find(([frame]) => frame > shown) ?? film.tunnelled[0])[0]);
 document.title = film.title ? `${film.title}, overlapper` : "overlapper";
 
 if (film.forces) {
