@@ -28,6 +28,7 @@ COMMANDS = {
     "forces": "forces.cost",
     "firsttry": "forces.firsttry",
     "boxes": "boxes.iou",
+    "motion": "motion.impacts",
     "audit": "costs.audit",
     "concave": "costs.concave",
     "recording": "costs.recording",
