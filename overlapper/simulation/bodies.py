@@ -12,7 +12,7 @@ from typing import Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Overlaps, Placed, Shape, _core, overlap, overlaps, times_of_impact
+from overlapper import Overlaps, Placed, Shape, TimesOfImpact, _core, overlap, overlaps, times_of_impact
 from overlapper.simulation.asked_pairs import Among, AskedPairs, Numbered, Who, listed
 from overlapper.simulation.cautions import SkippedShapeWarning
 from overlapper.simulation.collision_rules import Mask, Rules, partners
@@ -27,6 +27,8 @@ from overlapper.simulation.report import Report
 from overlapper.simulation.source import Source
 
 NOWHERE = "it has no finite pose within 1e25 m: the simulation has diverged"
+
+_NO_PAIRS = np.empty((0, 2), np.int32)
 
 Which = TypeVar("Which", bound="AnyBodies")
 Named = TypeVar("Named", Skipped, Decomposed)
@@ -48,11 +50,12 @@ class AnyBodies:
         self._asked: Literal["simulated", "all"] | int = "simulated"
         self._found = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
         self._last: tuple[Contacts, Layout, partial[Mask]] | None = None
-        self._measured: Array | None = None  # the positions of the last overlaps()
         self._arrange()
         self._refresh(stacklevel=4)
         self._before: Moment | None = None  # the update before the last one
         self._now = Moment.of(self._layout, self._grounds.links)
+        # Pairs of shapes that overlap or touch at these two moments, as far as the last overlaps() there has found.
+        self._met_before, self._met_now = _NO_PAIRS, _NO_PAIRS
 
     def update(self) -> None:
         """Read the shapes of new bodies and changed filters, then all poses. Call it once per step.
@@ -61,6 +64,7 @@ class AnyBodies:
         """
         self._refresh(stacklevel=3)
         self._before, self._now = self._now, Moment.of(self._layout, self._grounds.links)
+        self._met_before, self._met_now = self._met_now, _NO_PAIRS
 
     def follow(self) -> None:
         """Read all poses of the bodies known at the last `update()`. Bodies that come or go are not noticed."""
@@ -114,7 +118,8 @@ class AnyBodies:
             self._found = layout.batch.overlaps(
                 layout.positions, layout.orientations, self.pairs(among), tolerance, threads, method, separated=False
             )
-        self._measured = layout.positions
+        if layout.positions is self._now.positions:
+            self._met_now = self._found.pairs
         contacts = Contacts(layout.key_rows, self._found, self._names, self._source.contact)
         self._last = contacts, layout, partial(self._pairs.chosen, among=among, rules=self._rules)
         return contacts
@@ -165,12 +170,12 @@ class AnyBodies:
         first, second = examined.T
         examined = examined[known[first] & known[second] & (moves[first] | moves[second])]
         examined = examined[self._pairs.chosen(examined, asked, self._rules)]
-        if self._measured is before.positions and before.layout is layout:
-            examined = examined[~np.isin(_codes(examined), _codes(self._found.pairs))]
+        if before.layout is layout:
+            examined = examined[~np.isin(_codes(examined), _codes(self._met_before))]
         found = times_of_impact(layout.batch, start, turned, *end, examined, tolerance=tolerance, threads=threads)
         met: list[FirstOverlap] = []
-        for row, (a, b) in enumerate(examined.tolist()):
-            impact = found[row]
+        for row in np.flatnonzero(found.status != TimesOfImpact.STATUSES.index("separated")).tolist():
+            (a, b), impact = examined[row].tolist(), found[row]
             status, time, point, normal = impact.status, impact.time, impact.point, impact.normal
             if status == "separated" or status == "overlapping" or impact.time_upper == 0:
                 continue
