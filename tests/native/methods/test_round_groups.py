@@ -2,9 +2,11 @@
 
 from fractions import Fraction
 
+import graded
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from strategies import directions
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 from overlapper.proof.certificate import certificate
@@ -177,3 +179,18 @@ def test_a_face_that_appears_just_beside_the_end_of_a_cylinder_is_found():
     low, high = certificate(found).verify()
     assert low - Fraction(found.volume_error) <= Fraction(found.volume) <= high + Fraction(found.volume_error)
     assert found.volume == pytest.approx(float(high), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "seed"),
+    [("ball, capsule", 10093), ("capsule, cylinder", 10201), ("capsule, capsule", 10346), ("ball, cylinder", 10376)],
+)
+def test_stated_errors_hold_where_a_plane_cuts_a_thin_lens_aslant(kinds, seed):
+    """Rounding of the corner between the plane and an arc moves the corner off the arc."""
+    contact = graded.made(kinds, seed)
+    whole = overlap(contact.a, contact.b)
+    for normal in directions(np.random.default_rng(5), 60):
+        offset = float(normal @ whole.centroid)
+        halves = [overlap(contact.a, contact.b, HalfSpace(side * normal, side * offset)) for side in (1, -1)]
+        stated = sum(each.volume_error for each in (whole, *halves))
+        assert abs(sum(half.volume for half in halves) - whole.volume) <= stated

@@ -311,6 +311,17 @@ class Bundle {
     return segments;
   }
 
+  /// Adds the distance of a corner along a line, as far as it is across the arc: rounding moves the corner off the arc.
+  void add_off_arc(const Line& line, const Points& corner, Row& off) const {
+    const double nx = line.normal.x / line.length, ny = line.normal.y / line.length;
+    const Row& radius = sides_.half[stack_.ball];
+    for (int k = 0; k < kRow; ++k) {
+      const double x = corner.x[k], y = corner.y[k];
+      const double facing = nx * (y - sides_.centre_y[k]) - ny * (x - sides_.centre_x[k]);
+      off[k] += radius[k] > 0 ? std::abs(facing * (nx * y - ny * x)) / radius[k] : 0;
+    }
+  }
+
   /// Adds the arcs from p to q, counter-clockwise: the segments beyond their chords, and the zone of the sphere.
   void add_arc(const Points& p, const Points& q, int before, int after) {
     const Quadric& ball = stack_.quadric[stack_.ball];
@@ -321,6 +332,8 @@ class Bundle {
     find_chords(p, q, before, after, chords);
     const Row &length = chords.length, &ax = chords.x, &ay = chords.y, &angle = chords.angle;
     const Segments segments = segments_of(chords);
+    Row off_arc{};
+    add_off_arc(stack_.line[before], p, off_arc), add_off_arc(stack_.line[after], q, off_arc);
     Row strip, blur, px, py, up, t_up, size;
     for (int k = 0; k < kRow; ++k) {
       const double r = radius[k], r2 = r * r, w = segments.area[k] * r2, f = segments.first_across[k] * r2 * r;
@@ -339,7 +352,7 @@ class Bundle {
       strip[k] = turned;
       px[k] = counts_[k] * length[k] * x, py[k] = counts_[k] * length[k] * y;
       up[k] = z, t_up[k] = t * z, size[k] = std::abs(t) * (std::abs(t) + std::abs(level)) * turned;
-      blur[k] = 0.5 * turned * (stretch * t * t + along * std::abs(t) + slack + length[k] * length[k]);
+      blur[k] = 0.5 * turned * (stretch * t * t + along * std::abs(t) + slack + length[k] * length[k] + off_arc[k] * r);
     }
     sum_.blur += sum(blur);
     const double all = sum(strip), surface = stack_.stretch ? stretched_zone(ax, ay, angle) : all * ball.radius;
