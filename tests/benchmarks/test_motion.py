@@ -23,28 +23,27 @@ def test_a_few_motions_of_each_kind_are_measured_and_checked(kind):
     rows = list(impacts.figures(kind, 6))
     found = {(library, figure): value for _, library, figure, value in rows}
     assert found["ours", "widest"] < 1.1e-9 and found["ours", "us"] > 0
-    assert found["1,000 poses", "false"] == 0
+    # Where bodies turn, FCL reads a point that it has never set, and its answers depend on what the memory contains.
+    assert kind.turn or found["1,000 poses", "false"] == 0
     assert {library for library, figure in found if figure == "us"} == {*impacts.SETTINGS, "ours", "ours, one call"}
     assert {figure for _, figure in found} >= {"missed", "false", "late", "latest", "early", "us slowest"}
 
 
 def test_fcl_moves_bodies_as_this_package_does():
-    """The first of FCL's 1,000 poses that overlaps comes just after the time of impact.
-
-    FCL may miss an overlap: some answers for the same motion differ from process to process.
-    """
-    (kind,) = (each for each in impacts.KINDS if each.name == "boxes, turned")
-    differences = []
-    for motion in impacts.motions(kind, 5, 8):
+    """The first of FCL's 1,000 poses that overlaps comes just after the time of impact."""
+    for motion in impacts.motions(impacts.KINDS[0], 5, 8):
         found = impacts.ours_of(motion)
         hit, time = impacts.of_peer(motion, "1,000 poses")()
-        assert found or not hit
-        differences += [found.time - time] * hit
+        assert hit == bool(found) and (not hit or -1.1e-3 < found.time - time < 1e-9)
+
+
+def test_a_constant_turn_ends_at_the_last_pose():
+    (kind,) = (each for each in impacts.KINDS if each.name == "boxes, turned")
+    for motion in impacts.motions(kind, 5, 8):
         ends = [impacts.at(start, end, impacts.turning(start, end), 1.0) for start, end in zip(motion, motion[2:])]
         for told, end in zip(ends, motion[2:]):
             assert np.abs(told.position - end.position).max() < 1e-12
             assert abs(told.orientation @ end.orientation) == pytest.approx(1, abs=1e-12)
-    assert -1e-3 < np.median(differences) < 1e-9
 
 
 def test_a_wrong_time_ends_the_run():
