@@ -60,7 +60,8 @@ WAIT = """
 def wait():
     import os, pathlib, time
 
-    pathlib.Path("waits").write_text(str(os.getpid()))
+    pathlib.Path("writes").write_text(str(os.getpid()))
+    os.rename("writes", "waits")
     time.sleep(60)
 """
 
