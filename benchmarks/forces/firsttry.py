@@ -125,7 +125,7 @@ def resting(row: dict[str, Any]) -> np.ndarray:
 def fault(bullet: dict[str, Any], ours: dict[str, Any]) -> str:
     """How a scene does not end as Bullet's does, in a few words; nothing if it does."""
     if not int(ours["finite"]):
-        return "not finite"
+        return ours.get("warnings") or "not finite"
     found = []
     rest, still = resting(bullet), resting(ours)
     if still.sum() < rest.sum():
