@@ -45,6 +45,15 @@ class Contact:
         return self.bodyA, self.linkA, self.bodyB, self.linkB
 
 
+def key_columns(keys: NDArray[np.int64], names: Mapping[tuple[int, int], str]) -> Columns:
+    """The columns bodyA, linkA, shapeA, nameA, then those of B, from rows of six integers."""
+    columns: Columns = {}
+    for side, at in (("A", keys[:, :3]), ("B", keys[:, 3:])):
+        columns |= {f"{word}{side}": values for word, values in zip(("body", "link", "shape"), at.T)}
+        columns[f"name{side}"] = [names.get((body, link)) for body, link in at[:, :2].tolist()]
+    return columns
+
+
 class Contacts(Tabular, Sequence[Contact]):
     """The contacts of a step, sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB), one by one or as arrays.
 
@@ -124,10 +133,7 @@ class Contacts(Tabular, Sequence[Contact]):
         """
         found = self.overlaps
         keys = self.keys
-        columns: Columns = {}
-        for side, at in (("A", keys[:, :3]), ("B", keys[:, 3:])):
-            columns |= {f"{word}{side}": values for word, values in zip(("body", "link", "shape"), at.T)}
-            columns[f"name{side}"] = [self.names.get((body, link)) for body, link in at[:, :2].tolist()]
+        columns = key_columns(keys, self.names)
         measures = chain.from_iterable(np.atleast_2d(getattr(found, name).T) for name in MEASURES)
         return columns | {"status": STATUS[found.status].tolist()} | dict(zip(MEASURE_COLUMNS, measures))
 

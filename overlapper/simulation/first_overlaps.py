@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from overlapper.columns import IMPACT_COLUMNS, Columns, Rows
 from overlapper.simulation.collision_rules import Mask
+from overlapper.simulation.contacts import key_columns
 from overlapper.simulation.layout import Layout, Pose
 from overlapper.simulation.model import Array, LinkKey
 
@@ -92,11 +93,7 @@ class FirstOverlaps(Rows, list[FirstOverlap]):
         dict of str to ndarray or list
             A value for each row.
         """
-        columns: Columns = {}
-        keys = np.array([pair.key for pair in self], np.int64).reshape(-1, 6)
-        for side, at in (("A", keys[:, :3]), ("B", keys[:, 3:])):
-            columns |= {f"{word}{side}": values for word, values in zip(("body", "link", "shape"), at.T)}
-            columns[f"name{side}"] = [self.names.get((body, link)) for body, link in at[:, :2].tolist()]
+        columns = key_columns(np.array([pair.key for pair in self], np.int64).reshape(-1, 6), self.names)
         columns["status"] = [pair.status for pair in self]
         columns["apart"] = np.array([pair.apart for pair in self], bool)
         numbers = np.array([[pair.fraction, *pair.point, *pair.normal] for pair in self], float).reshape(-1, 7)
