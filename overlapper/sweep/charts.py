@@ -19,6 +19,9 @@ Values = NDArray[np.float64]
 APART = 24
 BINS = 12
 
+# The ticks are the values of the parameter if it has at most this many. More labels would overlap.
+LABELLED = 6
+
 
 @dataclass(frozen=True, slots=True)
 class Measure:
@@ -33,7 +36,7 @@ MEASURES = (
     Measure("largest_volume_m3", "largest volume, cm³", 1e6),
     Measure("largest_depth_m", "largest depth, mm", 1e3),
     Measure("contact_time_s", "time in contact, s", 1.0),
-    Measure("mean_force_m2", "mean force per pressure, mm²", 1e6),
+    Measure("mean_force_m2", "mean contact area, mm²", 1e6),
 )
 
 # The measure of volumetric contact.
@@ -71,7 +74,8 @@ def axis(name: str, values: Sequence[Any] | NDArray[Any]) -> Axis:
     else:
         edges, group = _edges(middles), np.searchsorted(middles, scaled)
     back = np.exp if log else np.asarray
-    return Axis(name, group, back(middles), back(edges), log=log)
+    labels = [f"{value:.3g}" for value in back(middles)] if len(middles) <= LABELLED else None
+    return Axis(name, group, back(middles), back(edges), labels, log)
 
 
 def _edges(middles: Values) -> Values:
@@ -90,6 +94,7 @@ def lines(across: Axis, measured: Sequence[tuple[Measure, Values]], middle: Call
         axes.fill_between(x, least, most, alpha=0.2, linewidth=0)
         axes.plot(x, middles, ".-", markersize=4, linewidth=1.2)
         axes.set(xlabel=across.name, title=measure.label)
+        axes.ticklabel_format(useOffset=False)
         _scaled(axes.xaxis, axes.set_xscale, across)
         axes.grid(alpha=0.3)
     return _svg(figure)
@@ -109,7 +114,7 @@ def heat_map(
         for place, group in zip(places, groups):
             cells.flat[place] = middle(values[group]) * measure.factor
         drawn = axes.pcolormesh(across.edges, up.edges, cells, cmap="viridis", edgecolors="face", linewidth=0.2)
-        figure.colorbar(drawn, ax=axes)
+        figure.colorbar(drawn, ax=axes).ax.ticklabel_format(useOffset=False)
         axes.set(xlabel=across.name, ylabel=up.name, title=measure.label)
         _scaled(axes.xaxis, axes.set_xscale, across)
         _scaled(axes.yaxis, axes.set_yscale, up)
@@ -121,6 +126,7 @@ def _scaled(ticks: Any, set_scale: Any, axis: Axis) -> None:
         set_scale("log")
     if axis.labels:
         ticks.set_ticks(axis.middles, axis.labels)
+        ticks.set_ticks([], minor=True)
 
 
 def must_be_there() -> None:

@@ -139,13 +139,12 @@ def _worst(sweep: Sweep, store: Store, scene: str, worst: Sequence[Row]) -> str:
         shown = "".join(f'<td class="number">{html.escape(each)}</td>' for each in figures)
         moment = (row["worst_step"] or 1) * row["time_s"] / row["steps"]
         place = _view(row)
-        link = place.name
-        if (store.folder / place).exists():
-            link = f'<a href="{place.as_posix()}#t={moment:.6g}">{link}</a>'
+        there = (store.folder / place).exists()
+        link = f'<a href="{place.as_posix()}#t={moment:.6g}">{place.name}</a><br>' if there else ""
         how = html.escape(command(sweep, scene, row, store.folder / place))
         lines.append(
             f'<tr>{shown}<td>{html.escape(pair)}</td><td class="number">{row["worst_step"] or ""}</td>'
-            f"<td>{link}<br><code>{how}</code></td></tr>"
+            f"<td>{link}<code>{how}</code></td></tr>"
         )
     return "\n".join(lines)
 

@@ -1,5 +1,6 @@
 """The summary of a sweep: its charts group what a grid or a sample has, and its commands show what they say."""
 
+import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
@@ -44,6 +45,17 @@ def test_charts_are_the_same_again_and_are_svg():
     assert charts.lines(across, measured) == charts.lines(across, measured)
 
 
+def test_ticks_are_the_values_of_a_short_parameter_and_have_no_offset():
+    assert axis("mass", [0.1, 10**-0.5, 1.0]).labels == ["0.1", "0.316", "1"]
+    assert axis("mass", np.arange(9.0)).labels is None
+    values = 1e-6 * (123456 + np.array([0.0, 1.0, 2.0, 3.0]))
+    across, up = axis("mass", [0.1, 1.0, 10.0, 100.0]), axis("friction", [0.3, 0.5, 0.3, 0.5])
+    for drawn in (charts.lines(across, [(MEASURES[0], values)]), charts.heat_map(across, up, [(MEASURES[0], values)])):
+        texts = {text.text for text in ET.fromstring(drawn).iter("{http://www.w3.org/2000/svg}text")}
+        assert {"0.1", "100"} <= texts and any(text.startswith("12345") for text in texts)
+        assert not any(text.startswith("+") for text in texts)
+
+
 @pytest.mark.usefixtures("balls")
 def test_a_page_of_samples_and_settings_has_maps_and_whole_commands():
     grids = ["apart=0.1:0.19:30", "seconds=0.0,0.001", "seed=0,1"]
@@ -74,6 +86,16 @@ def test_the_summary_counts_the_tasks_in_which_something_overlaps():
         page.write(sweep_of(grids, steps=1), store, "balls.py")
     text = Path("runs/summary.html").read_text()
     assert "5 of 5 tasks are done over apart (5). Something overlaps in 2 of them." in text
+    assert "<a href" not in text
+
+
+@pytest.mark.usefixtures("balls")
+def test_the_links_of_the_summary_are_to_pages_that_exist():
+    swept("runs", ["apart=0.15,0.199"], steps=1)
+    with sweep_of(["apart=0.15,0.199"], steps=1).opened(Path("runs")) as store:
+        page.write(sweep_of(["apart=0.15,0.199"], steps=1), store, "balls.py", pages=1)
+    (link,) = re.findall(r'<a href="([^"#]*)#t=', Path("runs/summary.html").read_text())
+    assert Path("runs", link).is_file()
 
 
 def test_the_summary_names_what_is_to_be_installed(monkeypatch):
