@@ -14,7 +14,7 @@ namespace overlapper {
 namespace {
 
 /// More steps than any pair needs that comes closer steadily.
-constexpr int kMostSteps = 400;
+constexpr int kMostAdvances = 400;
 
 /// More values of one gap than the search for its zero needs.
 constexpr int kMostValues = 48;
@@ -262,7 +262,7 @@ class Motion {
       return done(Meeting::kSeparated, duration_, duration_);
     }
     Distance nearest = place(t);
-    while (impact_.steps < kMostSteps) {
+    while (impact_.steps < kMostAdvances) {
       if (!separated(nearest, t)) {
         if (met_after(t, nearest)) return impact_;
         continue;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "geometry/lanes.h"
 #include "methods/round/quadric/segment.h"
 
 namespace overlapper::slicing {
@@ -50,6 +51,29 @@ void wide_segments(const Row& angle, const Row& sine, const Row& cosine, Segment
   }
 }
 
+void find_sides_by_rows(const Stack& stack, const Row& t, const Row& tail, Sides& sides) {
+  for (int i = 0; i < stack.quadrics; ++i) {
+    const Quadric& q = stack.quadric[i];
+    const double low = q.low, high = q.high, stretch = 1 + dot(q.shear, q.shear), along = q.along, slack = q.slack;
+    const Point c = q.centre, s = q.shear;
+    Row &half = sides.half[i], &upper = sides.upper[i], &lower = sides.lower[i];
+    for (int k = 0; k < kRow; ++k) half[k] = std::sqrt(std::max(0.0, (t[k] - low + tail[k]) * (high - t[k] - tail[k])));
+    if (q.ball) {
+      for (int k = 0; k < kRow; ++k) {
+        sides.centre_x[k] = c.x - t[k] * s.x, sides.centre_y[k] = c.y - t[k] * s.y;
+        sides.slack[k] = stretch * t[k] * t[k] - 2 * along * t[k] + slack;
+      }
+      continue;
+    }
+    for (int k = 0; k < kRow; ++k) {
+      const double constant = stretch * t[k] * t[k] - 2 * along * t[k] + slack, middle = c.x - s.x * t[k];
+      const double far = middle > 0 ? middle + half[k] : middle - half[k];
+      const double near = q.nearer(far, middle, constant, t[k]);
+      upper[k] = middle > 0 ? far : near, lower[k] = middle > 0 ? near : far;
+    }
+  }
+}
+
 /// Slices of one outline, a row of them after the other.
 class Bundle {
  public:
@@ -58,7 +82,7 @@ class Bundle {
   void add(const Row& t, const Row& tail, const Row& counts) {
     t_ = t, counts_ = counts;
     area_ = x_ = y_ = xx_ = yy_ = xy_ = surface_ = {};
-    find_sides(stack_, t_, tail, sides_);
+    find_sides_by_rows(stack_, t_, tail, sides_);
     if (outline_.whole_disc) add_disc();
     else go_round();
     finish();
@@ -461,32 +485,7 @@ class Bundle {
   Integrals sum_;
 };
 
-}  // namespace
-
-void find_sides(const Stack& stack, const Row& t, const Row& tail, Sides& sides) {
-  for (int i = 0; i < stack.quadrics; ++i) {
-    const Quadric& q = stack.quadric[i];
-    const double low = q.low, high = q.high, stretch = 1 + dot(q.shear, q.shear), along = q.along, slack = q.slack;
-    const Point c = q.centre, s = q.shear;
-    Row &half = sides.half[i], &upper = sides.upper[i], &lower = sides.lower[i];
-    for (int k = 0; k < kRow; ++k) half[k] = std::sqrt(std::max(0.0, (t[k] - low + tail[k]) * (high - t[k] - tail[k])));
-    if (q.ball) {
-      for (int k = 0; k < kRow; ++k) {
-        sides.centre_x[k] = c.x - t[k] * s.x, sides.centre_y[k] = c.y - t[k] * s.y;
-        sides.slack[k] = stretch * t[k] * t[k] - 2 * along * t[k] + slack;
-      }
-      continue;
-    }
-    for (int k = 0; k < kRow; ++k) {
-      const double constant = stretch * t[k] * t[k] - 2 * along * t[k] + slack, middle = c.x - s.x * t[k];
-      const double far = middle > 0 ? middle + half[k] : middle - half[k];
-      const double near = q.nearer(far, middle, constant, t[k]);
-      upper[k] = middle > 0 ? far : near, lower[k] = middle > 0 ? near : far;
-    }
-  }
-}
-
-Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices) {
+Integrals measure_by_rows(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices) {
   Bundle bundle(stack, outline);
   for (int first = 0; first < nodes.size; first += kRow) {
     Row t, tail, counts;
@@ -499,6 +498,31 @@ Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes
       slices.volume[first + k] = bundle.areas()[k], slices.area[first + k] = bundle.surfaces()[k];
   }
   return bundle.integrals();
+}
+
+#ifdef OVERLAPPER_WIDER
+OVERLAPPER_WIDER void find_sides_by_wider_rows(const Stack& stack, const Row& t, const Row& tail, Sides& sides) {
+  find_sides_by_rows(stack, t, tail, sides);
+}
+OVERLAPPER_WIDER Integrals measure_by_wider_rows(const Stack& stack, const Outline& outline, const Nodes& nodes,
+                                                 Slices& slices) {
+  return measure_by_rows(stack, outline, nodes, slices);
+}
+const bool kWider = is_wider();
+#else
+constexpr bool kWider = false;
+constexpr auto find_sides_by_wider_rows = find_sides_by_rows;
+constexpr auto measure_by_wider_rows = measure_by_rows;
+#endif
+
+}  // namespace
+
+void find_sides(const Stack& stack, const Row& t, const Row& tail, Sides& sides) {
+  (kWider ? find_sides_by_wider_rows : find_sides_by_rows)(stack, t, tail, sides);
+}
+
+Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices) {
+  return (kWider ? measure_by_wider_rows : measure_by_rows)(stack, outline, nodes, slices);
 }
 
 Integrals measure(const Stack& stack, const Outline& outline, double t) {
