@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import partial
-from typing import Literal, TypeVar
+from typing import Generic, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from overlapper import Overlaps, Placed, Shape, TimesOfImpact, _core, overlap, o
 from overlapper.simulation.asked_pairs import Among, AskedPairs, Numbered, Who, listed
 from overlapper.simulation.cautions import SkippedShapeWarning
 from overlapper.simulation.collision_rules import Mask, Rules, partners
-from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.contacts import Contacts, Kind
 from overlapper.simulation.first_overlaps import FirstOverlap, FirstOverlaps, Moment
 from overlapper.simulation.ground import Grounds
 from overlapper.simulation.layout import Layout, Pose
@@ -34,7 +34,7 @@ Which = TypeVar("Which", bound="AnyBodies")
 Named = TypeVar("Named", Skipped, Decomposed)
 
 
-class AnyBodies:
+class AnyBodies(Generic[Kind]):
     """The bodies of a simulation as convex shapes placed in the world, for any simulator.
 
     A `Source` answers for the simulator. `Bodies` of a simulator inherits from this class and makes its source.
@@ -49,7 +49,7 @@ class AnyBodies:
         # The choice of pairs of the last overlaps(), or the number of pairs if it was a list; then the result.
         self._asked: Literal["simulated", "all"] | int = "simulated"
         self._found = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
-        self._last: tuple[Contacts, Layout, partial[Mask]] | None = None
+        self._last: tuple[Contacts[Kind], Layout, partial[Mask]] | None = None
         self._arrange()
         self._refresh(stacklevel=4)
         self._before: Moment | None = None  # the update before the last one
@@ -77,7 +77,7 @@ class AnyBodies:
         method: Literal["auto", "paper"] = "auto",
         threads: int | None = 1,
         pairs: Among = "simulated",
-    ) -> Contacts:
+    ) -> Contacts[Kind]:
         """Pairs of shapes that overlap or touch.
 
         A result is reused in the next call if the poses of both shapes are bit-identical.
@@ -120,7 +120,8 @@ class AnyBodies:
             )
         if layout.positions is self._now.positions:
             self._met_now = self._found.pairs
-        contacts = Contacts(layout.key_rows, self._found, self._names, self._source.contact)
+        kind = cast("type[Kind]", self._source.contact)
+        contacts = Contacts(layout.key_rows, self._found, self._names, kind)
         self._last = contacts, layout, partial(self._pairs.chosen, among=among, rules=self._rules)
         return contacts
 

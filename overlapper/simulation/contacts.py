@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +54,18 @@ def key_columns(keys: NDArray[np.int64], names: Mapping[tuple[int, int], str]) -
     return columns
 
 
-class Contacts(Tabular, Sequence[Contact]):
+if TYPE_CHECKING:
+    # Type checkers know this module, with the defaults of type variables. At run time it may not be installed.
+    from typing_extensions import TypeVar
+
+    Kind = TypeVar("Kind", bound=Contact, covariant=True, default=Contact)
+else:
+    from typing import TypeVar
+
+    Kind = TypeVar("Kind", bound=Contact, covariant=True)
+
+
+class Contacts(Tabular, Sequence[Kind]):
     """The contacts of a step, sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB), one by one or as arrays.
 
     Each Contact is made at its first use, and kept. A slice, a mask or an array of indices selects contacts, as in
@@ -80,14 +91,14 @@ class Contacts(Tabular, Sequence[Contact]):
         keys: NDArray[np.int64],
         overlaps: Overlaps,
         names: Mapping[tuple[int, int], str] | None = None,
-        kind: type[Contact] = Contact,
+        kind: type[Kind] = Contact,  # type: ignore[assignment]
     ) -> None:
         """`keys` (k, 3) are body, link and shape of each shape that the pairs of `overlaps` index."""
         self.overlaps = overlaps
         self.names = names or {}
         self.kind = kind
         self._keys = keys
-        self._made: list[Contact | None] = [None] * len(overlaps)
+        self._made: list[Kind | None] = [None] * len(overlaps)
 
     @property
     def keys(self) -> NDArray[np.int64]:
@@ -98,10 +109,10 @@ class Contacts(Tabular, Sequence[Contact]):
         return len(self._made)
 
     @overload
-    def __getitem__(self, which: int) -> Contact: ...
+    def __getitem__(self, which: int) -> Kind: ...
     @overload
-    def __getitem__(self, which: slice | Sequence[int] | NDArray[Any]) -> Contacts: ...
-    def __getitem__(self, which: Any) -> Contact | Contacts:
+    def __getitem__(self, which: slice | Sequence[int] | NDArray[Any]) -> Contacts[Kind]: ...
+    def __getitem__(self, which: Any) -> Kind | Contacts[Kind]:
         if not isinstance(which, SupportsIndex) or isinstance(which, np.ndarray):
             return Contacts(self._keys, self.overlaps[which], self.names, self.kind)
         row = range(len(self))[which]
@@ -112,7 +123,7 @@ class Contacts(Tabular, Sequence[Contact]):
             self._made[row] = made
         return made
 
-    def __iter__(self) -> Iterator[Contact]:
+    def __iter__(self) -> Iterator[Kind]:
         return map(self.__getitem__, range(len(self)))
 
     def __eq__(self, other: object) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
 
 import mujoco
 import numpy as np
@@ -13,17 +12,14 @@ from numpy.typing import NDArray
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.cautions import UnknownBodyWarning
 from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.mujoco.contact import GeomContact
 from overlapper.simulation.mujoco.distances import own_distances
 from overlapper.simulation.mujoco.source import MujocoSource
 from overlapper.simulation.naming import named
 from overlapper.simulation.settings import Concave, Modelling, Surface
 
-if TYPE_CHECKING:
-    from overlapper.simulation.asked_pairs import Among
-    from overlapper.simulation.mujoco.contact import GeomContacts
 
-
-class Bodies(AnyBodies):
+class Bodies(AnyBodies[GeomContact]):
     """The geoms of one MuJoCo simulation as convex shapes placed in the world.
 
         bodies = Bodies(model, data)
@@ -72,16 +68,6 @@ class Bodies(AnyBodies):
     Pairs are those that mj_collision looks at, by masks, welds, parents, excludes, explicit pairs, flags and a
     contact filter in Python, at the last update. `pairs` and `overlaps` take other choices.
     """
-
-    if TYPE_CHECKING:
-
-        def overlaps(
-            self,
-            tolerance: float = 1e-3,
-            method: Literal["auto", "paper"] = "auto",
-            threads: int | None = 1,
-            pairs: Among = "simulated",
-        ) -> GeomContacts: ...
 
     def __init__(
         self,

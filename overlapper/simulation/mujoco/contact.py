@@ -3,15 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, overload
 
-from overlapper.simulation.contacts import Contact, Contacts
+from overlapper.simulation.contacts import Contact
 from overlapper.simulation.model import BASE
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,16 +40,3 @@ class GeomContact(Contact):
     def solids(self) -> tuple[int, int, int, int]:
         """(bodyA, -1, bodyB, -1): a body is rigid with all of its geoms."""
         return self.bodyA, BASE, self.bodyB, BASE
-
-
-if TYPE_CHECKING:
-
-    class GeomContacts(Contacts):
-        """Contacts of MuJoCo. Type checkers then know that each contact has geoms."""
-
-        @overload
-        def __getitem__(self, which: int) -> GeomContact: ...
-        @overload
-        def __getitem__(self, which: slice | Sequence[int] | NDArray[Any]) -> GeomContacts: ...
-        def __getitem__(self, which: Any) -> Any: ...
-        def __iter__(self) -> Iterator[GeomContact]: ...
