@@ -11,6 +11,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from command import overlapper
 
 from overlapper.cli.check import check
 from overlapper.cli.refusals import Refused
@@ -72,14 +73,15 @@ def scene_file(tmp_path, monkeypatch):
     (tmp_path / "two_cubes.py").write_text(TWO_CUBES)
 
 
-def overlapper(*arguments, **environment):
-    command = [sys.executable, "-m", "overlapper", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, env={**os.environ, **environment})
+def in_a_process(*arguments, **environment):
+    """Runs the command line where a scene may limit its process, or with other environment variables."""
+    words = [sys.executable, "-m", "overlapper", *arguments]
+    return subprocess.run(words, capture_output=True, text=True, timeout=60, env={**os.environ, **environment})
 
 
-def refusal(*arguments):
+def refusal(*arguments, run=overlapper):
     """The sentence on stderr of a command that must fail with exit code 2 and nothing on stdout."""
-    done = overlapper(*arguments)
+    done = run(*arguments)
     assert (done.returncode, done.stdout) == (2, "")
     return done.stderr.removeprefix("a scene may talk\n")
 
@@ -110,7 +112,7 @@ def test_help_shows_examples_and_a_bare_command_prints_help():
 
 
 def test_help_is_broken_at_the_margin_only_and_has_a_short_name():
-    text = overlapper("run", "-h", COLUMNS="200", TERMINAL_WIDTH="200").stdout
+    text = in_a_process("run", "-h", COLUMNS="200", TERMINAL_WIDTH="200").stdout
     assert "which fills a pybullet client. build(client) may return a function step(i)" in text
 
 
@@ -125,13 +127,13 @@ def test_help_is_broken_at_the_margin_only_and_has_a_short_name():
 )
 def test_a_shell_is_offered_commands_options_scenes_and_choices(line, offered):
     words = {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split()) - 1), "_OVERLAPPER_COMPLETE": "complete_bash"}
-    assert overlapper(**words).stdout.split() == offered
+    assert in_a_process(**words).stdout.split() == offered
 
 
 def test_completion_of_a_shell_is_installed_by_an_option(tmp_path):
     # Otherwise typer looks for the shell that started the tests, which may be none that has completion.
     told = {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
-    assert overlapper("--install-completion", "bash", HOME=str(tmp_path), **told).returncode == 0
+    assert in_a_process("--install-completion", "bash", HOME=str(tmp_path), **told).returncode == 0
     assert ".bash_completions/overlapper.sh" in (tmp_path / ".bashrc").read_text()
     assert "_OVERLAPPER_COMPLETE=complete_bash" in (tmp_path / ".bash_completions/overlapper.sh").read_text()
 
@@ -502,7 +504,7 @@ FULL = TWO_CUBES.replace("STEPS = 8", "STEPS = 200").replace(
 def test_a_disk_that_is_full_costs_no_earlier_file(tmp_path, ending, room):
     (tmp_path / f"old.{ending}").write_text("of yesterday")
     (tmp_path / "full.py").write_text(FULL.replace("ROOM", str(room)))
-    said = refusal("run", "full.py", "--html" if ending == "html" else "--out", f"old.{ending}")
+    said = refusal("run", "full.py", "--html" if ending == "html" else "--out", f"old.{ending}", run=in_a_process)
     assert said.startswith("overlapper: cannot write ") and said.count("\n") == 1
     assert (tmp_path / f"old.{ending}").read_text() == "of yesterday"
     kept = tmp_path / f"old.unfinished.{ending.replace('parquet', 'csv')}"
@@ -535,7 +537,7 @@ def test_a_run_that_lacks_something_costs_no_earlier_file_and_says_what_it_lacks
     built = TWO_CUBES.replace("def build(client):", f"def build(client):\n    {line}")
     assert built != TWO_CUBES
     (tmp_path / "lacking.py").write_text(built)
-    said = refusal("run", "lacking.py", "--out", "old.csv", "--check", "fcl")
+    said = refusal("run", "lacking.py", "--out", "old.csv", "--check", "fcl", run=in_a_process)
     assert said.startswith(sentence) and said.count("\n") == 1
     assert (tmp_path / "old.csv").read_text() == "of yesterday"
     assert not (tmp_path / "old.unfinished.csv").exists()

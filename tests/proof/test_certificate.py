@@ -116,7 +116,7 @@ def test_a_common_volume_is_proved(name):
     assert lower > 0
 
 
-@pytest.mark.parametrize("name", ["three", "ellipsoid_and_ball", "ellipsoid_and_two"])
+@pytest.mark.parametrize("name", ["three", "ellipsoid_and_ball"])
 def test_planes_bound_a_group_with_round_bodies_less_narrowly(name):
     """As certificates did before slices bounded by arcs did, and do where those fail."""
     common = found(IN_COMMON[name])
@@ -186,9 +186,9 @@ def test_several_bodies_with_a_round_one_have_proved_bounds_as_stated(bodies):
 # Fine hulls take too long.
 @pytest.mark.parametrize("name", [name for name in families.FAMILIES if "fine" not in name])
 def test_hard_families_are_proved(name):
-    overlaps = [overlap(*families.make(name, seed).placed, tolerance=0.1) for seed in range(6)]
-    for found in overlaps[:3]:
-        proved(found)
+    # Rounded meshes have many pieces, and each piece is proved.
+    for seed in range(1 if name == "rounded_meshes" else 3):
+        proved(overlap(*families.make(name, seed).placed, tolerance=0.1))
 
 
 @pytest.mark.parametrize("seed", [2000064, 3000207, 3000557])
