@@ -27,10 +27,11 @@ from overlapper.jobs.hand import Failed, Job
 
 try:
     from overlapper.proof.chain import Array, Body, Chain, ChainJoint, centres, outer
-    from overlapper.proof.cover import MANY, OPEN, PROVED, halves, open_share
+    from overlapper.proof.cover import OPEN, PROVED, halves, open_share
 except ModuleNotFoundError as error:
     raise ImportError(f"a proof over all configurations needs {hint('python-flint')}") from error
 
+MANY = 1024  # boxes at a time, which bounds the memory
 FULL_TURN = np.nextafter(math.pi, 4.0)  # a bound of an endless joint: the double below pi would leave a gap
 
 

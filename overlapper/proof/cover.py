@@ -1,4 +1,8 @@
-"""A cover of joint positions by boxes, checked without the core: no hole, and room between two shapes in each box."""
+"""A cover of joint positions by boxes, checked without the core: no hole, and room between two shapes in each box.
+
+The search for a cover bounds the room by `overlapper.proof.chain`. The check does not use this bound. It has a bound of
+its own, `overlapper.proof.interval_chain`.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.proof.chain import Array, Chain, centres
+from overlapper.proof.interval_chain import IntervalChain
 from overlapper.proof.refusal import CertificateError
 
 PROVED, OPEN = -1, -2  # boxes that are not halved
-MANY = 1024  # boxes at a time, which bounds the memory
 
 
 def halves(lower: Array, upper: Array, level: NDArray[np.int8]) -> tuple[Array, Array]:
@@ -42,7 +46,7 @@ def check(chain: Chain, lower: Array, upper: Array, splits: NDArray[np.int8], ax
         If the tree does not fit the joints between the shapes, if boxes or axes are missing or left over, or if the
         room along an axis is too small for what moves within its box.
     """
-    low, high, whole = lower[None], upper[None], upper - lower
+    low, high, whole, intervals = lower[None], upper[None], upper - lower, IntervalChain(chain)
     share, begin, used = 0.0, 0, 0
     if splits.ndim != 1 or axes.ndim != 2 or axes.shape[1] != 3:
         raise CertificateError("the cover is not a tree of boxes with an axis for each proved box")
@@ -58,11 +62,8 @@ def check(chain: Chain, lower: Array, upper: Array, splits: NDArray[np.int8], ax
         used += len(proved)
         if len(own) < len(proved):
             raise CertificateError("the cover has a proved box without an axis")
-        for start in range(0, len(proved), MANY):
-            rows = proved[start : start + MANY]
-            margins, _ = chain.margins(low[rows], high[rows], own[start : start + MANY])
-            if not (margins > 0).all():
-                raise CertificateError("the room along the axis of a box is too small for what moves within the box")
+        if not all(intervals.has_room(low[box], high[box], axis) for box, axis in zip(proved, own)):
+            raise CertificateError("the room along the axis of a box is too small for what moves within the box")
         share += open_share(low, high, level, whole)
         low, high = halves(low, high, level)
     if begin != len(splits) or used != len(axes):

@@ -184,6 +184,19 @@ def test_a_cover_is_verified(proved):
     assert (checked.names, checked.open_share, checked.wrong) == (("base", "lower"), 0.0, "")
 
 
+def test_the_check_uses_neither_the_bound_of_the_search_nor_the_core(proved, monkeypatch):
+    def used(*_):
+        raise AssertionError
+
+    for name in ("margins", "placed"):
+        monkeypatch.setattr(f"overlapper.proof.chain.Chain.{name}", used)
+    monkeypatch.setattr("overlapper.audit.prove.overlap", used)
+    with pytest.raises(AssertionError):
+        Prover(proved[0], 1)(proved[2][0].pair)
+    (checked,) = verify(proved[0], proved[3])
+    assert not checked.wrong
+
+
 def altered(proved, **changes):
     """What the check says of the cover after changes of its arrays, each a function."""
     robot, _, (proof,), path = proved

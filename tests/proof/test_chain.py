@@ -1,4 +1,9 @@
-"""The bound of a gap over a box of joint positions is below the exact gap of every configuration in the box."""
+"""The bound of a gap over a box of joint positions is below the exact gap of every configuration in the box.
+
+The interval arithmetic that checks such bounds finds room only where no configuration of the box overlaps.
+"""
+
+from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -7,6 +12,7 @@ import pytest
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, Hull, Placed, RoundedHull, Sphere, distance
 from overlapper.audit.prove import matrices
 from overlapper.proof.chain import Ball, Body, Chain, ChainJoint, ball, centres, cross, outer
+from overlapper.proof.interval_chain import IntervalChain
 from overlapper.proof.rational_body import RationalBody
 from overlapper.rational import exact
 
@@ -151,14 +157,93 @@ def test_no_configuration_of_a_box_is_nearer_than_the_bound(seed):
 
 
 def test_the_bound_is_tight_where_one_joint_swings_a_point():
-    # A ball on an arm of 1 m turns towards a ball. The gap along x is 2 - cos q - 0.2. It is 0.8 at q = 0.
-    arm = ChainJoint("revolute", np.zeros(3), np.array([0, 0, 0, 1.0]), np.array([0, 0, 1.0]), np.zeros(3), 0, 1.0, 0.0)
-    still, at_1 = np.array([0, 0, 0, 1.0]), np.array([1.0, 0, 0])
-    a = Body(np.zeros((1, 3)), 0.1, np.array([2.0, 0, 0]), still, ())
-    made = Chain(a, Body(np.zeros((1, 3)), 0.1, at_1, still, (arm,)))
+    # The gap along x is 2 - cos q - 0.2. It is 0.8 at q = 0.
+    made = arm_beside_a_ball(2.0)
     for half in (0.1, 0.01):
         (bound,), _ = made.margins(np.array([[-half]]), np.array([[half]]), np.array([[1.0, 0, 0]]))
         assert 0.8 - 0.51 * half**2 < bound < 0.8
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_intervals_find_room_at_a_configuration_where_the_exact_gap_is_positive(seed):
+    made, _, rng = chain(seed)
+    values = rng.uniform(-2, 2, len(made.columns))
+    axis = unit(rng, 3)
+    room = float(exact_room(made, dict(zip(made.columns, values)), axis))
+    for gap in (1e-12, -1e-12):
+        one = Chain(replace(made.a, radius=made.a.radius + room - gap), made.b)
+        assert IntervalChain(one).has_room(values, values, axis) == (gap > 0)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_configuration_overlaps_in_the_widest_box_where_intervals_find_room(seed, monkeypatch):
+    monkeypatch.setattr("overlapper.proof.interval_chain.PIECES", 8)
+    made, shapes, rng = chain(seed)
+    n, gap = len(made.columns), 0.0
+    while gap < 0.05:
+        middle = rng.uniform(-2, 2, n)
+        (gap,) = distances(made, shapes, middle[None])
+    placed = made.placed(middle[None])
+    axis = (placed[0].position.middle - placed[1].position.middle)[0, :, 0]
+    widths = rng.uniform(0.5, 1, n)
+    intervals, low, high = IntervalChain(made), 0.0, 2.0
+    for _ in range(6):
+        share = (low + high) / 2
+        lower, upper = middle - share * widths, middle + share * widths
+        (bound,), _ = made.margins(lower[None], upper[None], axis[None])
+        found = intervals.has_room(lower, upper, axis)
+        assert found or bound <= 0
+        low, high = (share, high) if found else (low, share)
+    values = middle + low * widths * np.vstack([rng.choice([-1.0, 1.0], (40, n)), rng.uniform(-1, 1, (20, n))])
+    assert low == 0 or min(distances(made, shapes, values)) > 0
+
+
+STILL = np.array([0, 0, 0, 1.0])
+
+
+def arm(column=0):
+    """A joint that turns about z, at the end of an arm of 1 m along x from the joint before. The first is at 0."""
+    along = np.array([1.0 if column else 0, 0, 0])
+    return ChainJoint("revolute", along, STILL, np.array([0, 0, 1.0]), np.zeros(3), column, 1.0, 0.0)
+
+
+def arm_beside_a_ball(place):
+    """A ball on an arm of 1 m, which turns about z, and a ball at x = `place`. Both have a radius of 0.1 m."""
+    fixed = Body(np.zeros((1, 3)), 0.1, np.array([place, 0, 0]), STILL, ())
+    return Chain(fixed, Body(np.zeros((1, 3)), 0.1, np.array([1.0, 0, 0]), STILL, (arm(),)))
+
+
+def test_intervals_find_no_room_in_more_than_a_full_turn_that_passes_a_ball():
+    made = IntervalChain(arm_beside_a_ball(1.199))
+    for half in (1.4, 1.6, 3.1, 4.0):
+        assert not made.has_room(np.array([1 - half]), np.array([1 + half]), np.array([1.0, 0, 0]))
+
+
+def test_intervals_find_room_below_a_bar_only_where_two_joints_together_do_not_lift_a_point_to_it():
+    # The point is at y = sin p + sin(p + q). Both first derivatives are 0 at p = pi / 2, q = pi.
+    lower, upper = np.array([np.pi / 2, np.pi]) - 0.3, np.array([np.pi / 2, np.pi]) + 0.3
+    highest = np.cos(0.3) - np.cos(0.6)
+    for gap in (0.02, -0.001):
+        bar = Body(np.array([[-1.0, 0, 0], [1.0, 0, 0]]), 0.0, np.array([0, highest + gap, 0]), STILL, ())
+        tip = Body(np.zeros((1, 3)), 0.0, np.array([1.0, 0, 0]), STILL, (arm(), arm(1)))
+        assert IntervalChain(Chain(bar, tip)).has_room(lower, upper, np.array([0, 1.0, 0])) == (gap > 0)
+
+
+@pytest.mark.parametrize("halved", [True, False])
+def test_intervals_halve_a_box_that_is_too_wide(monkeypatch, halved):
+    # The gap along x is 1.3 - cos q - 0.2. It is least at q = 0, where it is 0.1.
+    if not halved:
+        monkeypatch.setattr("overlapper.proof.interval_chain.PIECES", 1)
+    made = IntervalChain(arm_beside_a_ball(1.3))
+    lower, upper, axis = np.array([-0.2]), np.array([2.2]), np.array([1.0, 0, 0])
+    assert made.has_room(lower, upper, axis) == halved
+    assert not IntervalChain(arm_beside_a_ball(1.199)).has_room(lower, upper, axis)
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 0), (np.nan, 0, 0), (1, np.nan, 0), (np.inf, 0, 0), (-1, 0, 0)])
+def test_intervals_find_no_room_along_an_axis_that_is_none(axis):
+    at = np.array([1.0])
+    assert not IntervalChain(arm_beside_a_ball(1.3)).has_room(at, at, np.array(axis, dtype=float))
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda each: type(each).__name__)
