@@ -31,14 +31,22 @@ class Examiner:
 
     Adjacent links overlap by design in most robots, and their overlap depends only on the joints between them. They are
     tested at rest, at the corners and in the first 512 random configurations. Pairs that no joint moves are tested only
-    at rest. Overlaps with a depth of `least_depth` (m) or less do not count.
+    at rest. Overlaps with a depth of `least_depth` (m) or less do not count. `pairs` are the pairs of links to test:
+    all, if it is None.
     """
 
-    def __init__(self, robot: Robot, sampling: Sampling, tolerance: float = 1e-3, least_depth: float = 0.0) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        sampling: Sampling,
+        tolerance: float = 1e-3,
+        least_depth: float = 0.0,
+        pairs: list[LinkPair] | None = None,
+    ) -> None:
         self.robot, self.sampling = robot, sampling
         self.tolerance, self.least_depth = tolerance, least_depth
         self.kinematics = Kinematics(robot)
-        self.pairs = link_pairs(robot)
+        self.pairs = link_pairs(robot) if pairs is None else pairs
         shapes = [each.shape for each in robot.tree.shapes]
         links = np.array([each.link for each in robot.tree.shapes])
         first, second = np.triu_indices(len(shapes), 1)
@@ -61,7 +69,8 @@ class Examiner:
 
         It is bytes because jobs are compared, and == between arrays does not give a single bool.
         """
-        return pickle.dumps((self.robot, self.sampling.count, self.sampling.seed, self.tolerance, self.least_depth))
+        sampling = self.sampling.count, self.sampling.seed
+        return pickle.dumps((self.robot, sampling, self.tolerance, self.least_depth, self.pairs))
 
     def shape_pairs(self, *pairs: LinkPair) -> Counts:
         """(s, 2): the pairs of shapes of these pairs of links, as indices of shapes."""
@@ -125,5 +134,5 @@ class Examiner:
 
 def prepared(setup: bytes) -> Examiner:
     """The examiner of a setup."""
-    robot, count, seed, tolerance, least_depth = pickle.loads(setup)
-    return Examiner(robot, Sampling(robot, count, seed), tolerance, least_depth)
+    robot, sampling, tolerance, least_depth, pairs = pickle.loads(setup)
+    return Examiner(robot, Sampling(robot, *sampling), tolerance, least_depth, pairs)

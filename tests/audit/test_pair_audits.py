@@ -163,3 +163,12 @@ def test_an_examiner_gives_the_same_answers_twice(table):
     first, second, again = examiner(1), examiner(1), prepared(examiner.setup)(1)
     for tally in (second, again):
         assert (tally.met == first.met).all() and (tally.volume.value == first.volume.value).all()
+
+
+def test_an_examiner_of_few_pairs_counts_the_same_for_these():
+    robot = read_robot(DATA / "franka_panda/panda.urdf")
+    sampling = Sampling(robot, 2000, 0)
+    every = Examiner(robot, sampling)
+    few = Examiner(robot, sampling, pairs=every.pairs[20:45:2])
+    met, of_few = every(1).met[20:45:2], few(1).met
+    assert of_few.any() and (of_few == met).all() and (prepared(few.setup)(1).met == met).all()

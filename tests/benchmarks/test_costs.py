@@ -61,6 +61,13 @@ def test_a_robot_is_a_row_of_the_table_of_audits():
     assert int(cells[3]) == sum(map(int, cells[4:8])) > 0
 
 
+def test_proofs_of_a_robot_are_checked_and_survive_samples(monkeypatch):
+    monkeypatch.setattr(audit, "SURVIVED", 2000)
+    cells = audit.proofs_of("ur5_robot", 2000)
+    assert cells[:1] + cells[4:5] == ["ur5_robot", "3"] and cells[-2:] == ["0", "0"]
+    assert int(cells[2]) == sum(map(int, cells[4:7]))
+
+
 def test_hard_cases_are_checked_by_the_rules(capsys, tmp_path):
     words = said(capsys, "stress", "--count=3", "--family=general", "--workers=1", f"--out={tmp_path / 'rows.csv'}")
     assert re.search(r"\| all \| 3 \| \d+ \| \d+ \|.*\| 0 \|\n", words)
