@@ -3,6 +3,7 @@
     python benchmarks audit speed [ROUNDS]           configurations a second of a Franka, on one core
     python benchmarks audit robots [CONFIGURATIONS]  the table of docs/audit.md
     python benchmarks audit proofs [BOXES]           the table of proofs of docs/audit.md
+    python benchmarks audit moveit URDF SRDF ...     what MoveIt's files disable beside what is proved
 
 The first needs `pip install pin`, which is pinocchio with coal. Both sides have the same convex shapes: those that
 pybullet has made. Ours looks at blocks as in an audit, with volumes and depths; theirs says yes or no for the same
@@ -30,6 +31,7 @@ from overlapper.audit.audit import audit
 from overlapper.audit.examiner import Examiner
 from overlapper.audit.robot import read_robot
 from overlapper.audit.sampling import Sampling
+from overlapper.audit.srdf import read_srdf
 from overlapper.simulation.bullet.model_file import NotRead
 
 ROBOTS = Path(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots"))
@@ -188,13 +190,49 @@ def proofs_of(name: str, limit: int) -> list[str]:
     return list(map(str, [*cells, np.count_nonzero(met)]))
 
 
-WHAT = {"speed": speed, "robots": robots, "proofs": proofs}
+SAMPLED = 100_000  # configurations beside MoveIt's files
+
+
+def moveit(*files: str) -> None:
+    """A row for each robot and its SRDF file, then the pairs that the file disables as "Never" although they overlap.
+
+    Only pairs that are not adjacent count, and are modelled by convex hulls of their meshes.
+    """
+    heading = ["robot", "Never in the file", "proved", "overlap", "open", "not in the file, proved"]
+    rows, overlaps = [], []
+    for urdf, srdf in zip(files[::2], files[1::2], strict=True):
+        row, wrong = moveit_of(Path(urdf), Path(srdf))
+        rows.append(row)
+        overlaps += wrong
+    print(table(heading, rows), *overlaps, sep="\n")
+
+
+def moveit_of(urdf: Path, srdf: Path) -> tuple[list[str], list[str]]:
+    from overlapper.audit.prove import prove
+
+    sampled, disabled = audit(read_robot(urdf), SAMPLED), read_srdf(srdf)
+    proofs = {each.names: each for each in prove(sampled, 20_000)}
+    reasons = {names: disabled.get(frozenset(names)) for names in proofs}
+    never = [names for names, reason in reasons.items() if reason == "Never"]
+    counts = [sum(proofs[names].verdict == verdict for names in never) for verdict in ("never", "overlaps", "open")]
+    unused = sum(reason is None and proofs[names].verdict == "never" for names, reason in reasons.items())
+    wrong = [
+        f"{urdf.stem}: {' and '.join(each.names)} overlap in {each.met:,} of {each.asked:,} configurations, by up to "
+        f"{1e3 * each.deepest.contact.depth:.3g} mm"
+        for each in sampled.pairs
+        if each.names in never and each.deepest
+    ]
+    return list(map(str, [urdf.stem, len(never), *counts, unused])), wrong
+
+
+WHAT = {"speed": speed, "robots": robots, "proofs": proofs, "moveit": moveit}
 
 
 def options(parser: ArgumentParser) -> None:
     parser.add_argument("what", choices=WHAT)
-    parser.add_argument("number", nargs="?", type=int, help="of rounds, configurations or boxes")
+    parser.add_argument("given", nargs="*", help="a number of rounds, configurations or boxes; for moveit, files")
 
 
 def main(chosen: Namespace) -> None:
-    WHAT[chosen.what](*[chosen.number] * (chosen.number is not None))
+    given = chosen.given if chosen.what == "moveit" else map(int, chosen.given)
+    WHAT[chosen.what](*given)

@@ -2,6 +2,8 @@
 
 import re
 
+from robots import joint, limit, link, urdf
+
 from costs import audit, recording
 from harness import command
 from stability import graded
@@ -66,6 +68,19 @@ def test_proofs_of_a_robot_are_checked_and_survive_samples(monkeypatch):
     cells = audit.proofs_of("ur5_robot", 2000)
     assert cells[:1] + cells[4:5] == ["ur5_robot", "3"] and cells[-2:] == ["0", "0"]
     assert int(cells[2]) == sum(map(int, cells[4:7]))
+
+
+def test_the_pairs_of_an_srdf_file_stand_beside_their_proofs(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(audit, "SAMPLED", 300)
+    bodies = [("base", "0 0 0"), ("far", "9 0 0"), ("near", "0.5 0 0"), ("top", "0 0 9")]
+    links = [link(name, ("1 1 1", place)) for name, place in bodies]
+    bolts = [joint(f"to {name}", "fixed", parent, name) for parent, name in (("base", "far"), ("far", "near"))]
+    arm = urdf(tmp_path / "made.urdf", *links, *bolts, joint("turn", "revolute", "near", "top", limit(-1, 1)))
+    disabled = [f'<disable_collisions link1="base" link2="{name}" reason="Never"/>' for name in ("near", "top")]
+    (tmp_path / "made.srdf").write_text(f'<robot name="made">{"".join(disabled)}</robot>', encoding="utf-8")
+    lines = said(capsys, "audit", "moveit", arm, tmp_path / "made.srdf").splitlines()
+    assert lines[2] == "| made | 2 | 1 | 1 | 0 | 1 |"
+    assert re.match(r"made: base and near overlap in 1 of 1 configurations, by up to 500 mm", lines[3])
 
 
 def test_hard_cases_are_checked_by_the_rules(capsys, tmp_path):
