@@ -568,6 +568,19 @@ class Errors:
         """
 
     @property
+    def shape_gradient(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (m, 3) m², for each entry. NaN where there is no derivative. Computed on each access.
+        """
+
+    @property
+    def vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]:
+        """
+        For each body, (k,) m²: bounds of the lengths of the errors of the rows; None for a body that is no hull. Computed on
+        each access.
+        """
+
+    @property
     def depth(self) -> float | None:
         """
         m. None for three or more bodies. The same holds for `distance` and `witnesses`.
@@ -691,11 +704,22 @@ class Overlap:
     def shape_gradient(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
         (m, 3) d volume / d (half extents) of each box, m². For a half-space, d volume / d (offset along its unit normal), then
-        zeros. For round bodies of a pair: d volume / d radius of a sphere or a rounded hull, then zeros; d volume / d (radius,
-        length) of a capsule or a cylinder, then zero. It is the integral over the common surface of the speed at which the surface
-        moves out. Where faces of two bodies lie in one plane, the volume has two one-sided derivatives, and the area counts for
-        either body. NaN for hulls and ellipsoids, for boxes, cylinders and lengths of bodies that overlap an ellipsoid, for a
-        length of 0, and for groups with a round body; zeros unless overlapping.
+        zeros. For round bodies: d volume / d radius of a sphere or a rounded hull, then zeros; d volume / d (radius, length) of a
+        capsule or a cylinder, then zero. It is the integral over the common surface of the speed at which the surface moves out.
+        Where faces of two bodies lie in one plane, the volume has two one-sided derivatives, and the area counts for either body.
+        For groups with a round body, it is that of an enclosing polytope. NaN for ellipsoids and for hulls, which have
+        `vertex_gradients`; for boxes, cylinders and lengths of bodies that overlap an ellipsoid; for a length of 0. Zeros unless
+        overlapping. `errors.shape_gradient` bounds the errors.
+        """
+
+    @property
+    def vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]:
+        """
+        For each body, the (k, 3) d volume / d (position of a vertex), world axes, m², of the rows of `Hull.vertices`; None
+        for a body that is no hull. The vertices of a body have the sum gradient[i, :3]. A facet of more than three corners counts as
+        a fan of triangles from its first corner. The volume has other one-sided derivatives there, as a vertex that leaves the facet
+        may fold it in another way. NaN if the hull overlaps a round body; zeros unless overlapping. `errors.vertex_gradients` bounds
+        the errors.
         """
 
     @property
@@ -1011,6 +1035,13 @@ class Overlaps:
     def patch_area(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (p, 3) m², the area vector of the patch, from b to a; zeros unless overlapping.
+        """
+
+    @property
+    def shape_gradient(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 2, 3) derivatives of the volume by the sizes of a and of b, m², as Overlap.shape_gradient; zeros unless
+        overlapping. The first use takes some microseconds for each pair of polyhedra.
         """
 
     @property

@@ -14,6 +14,7 @@
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
 #include "methods/round/closed_forms/closed_forms.h"
+#include "overlap/shape_gradient.h"
 #include "shapes/planes_asked.h"
 
 namespace overlapper {
@@ -145,6 +146,16 @@ const Overlaps::Patches& Overlaps::patches() const {
       found.moments.push_back(of_row.moments);
       found.distance.push_back(of_row.distance);
     }
+    return found;
+  });
+}
+
+const std::vector<ShapeGradients>& Overlaps::shape_gradients() const {
+  return shape_gradients_->get([this] {
+    std::vector<ShapeGradients> found(size());
+    for (size_t row = 0; row < size(); ++row)
+      if (status[row] == static_cast<std::int8_t>(Status::kOverlapping))
+        std::ranges::copy(shape_gradient(*overlap(row)), found[row].begin());
     return found;
   });
 }

@@ -22,6 +22,9 @@ using PoseNumbers = std::array<double, 7>;
 /// d volume / d (translation, rotation vector about the body's own position) of a and of b.
 using BodyGradients = std::array<std::array<double, 6>, 2>;
 
+/// The derivatives of the volume by the numbers of the shapes of a and of b, as in shape_gradient().
+using ShapeGradients = std::array<Vec3, 2>;
+
 /// The common sets of the pairs of one call, a column per quantity and a row per pair.
 struct Overlaps {
   struct Row {
@@ -66,13 +69,17 @@ struct Overlaps {
   Overlaps select(std::span<const std::int64_t> rows) const;
   /// Computed on first use, pair by pair.
   const Patches& patches() const;
+  const std::vector<ShapeGradients>& shape_gradients() const;
   /// The patch of a row. It is seen along a unit direction if one is given.
   Patch patch(size_t row, const std::optional<Vec3>& direction = {}) const;
 
  private:
   Placed placed(int body) const;
 
-  std::shared_ptr<Once<Patches>> patches_ = std::make_shared<Once<Patches>>();
+  template <class T>
+  using Shared = std::shared_ptr<Once<T>>;
+  Shared<Patches> patches_ = std::make_shared<Once<Patches>>();
+  Shared<std::vector<ShapeGradients>> shape_gradients_ = std::make_shared<Once<std::vector<ShapeGradients>>>();
 };
 
 /// A column of Overlaps: its name in Python, its vector, the value of a row, and its docstring in Python.

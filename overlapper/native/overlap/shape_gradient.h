@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "geometry/measures.h"
@@ -8,19 +9,30 @@
 
 namespace overlapper {
 
+/// Stands for a derivative that does not exist or is not known.
+inline constexpr double kNoDerivative = std::numeric_limits<double>::quiet_NaN();
+
+/// The axis of a box that is across a facet with this normal.
+int axis_across(const Placed& box, Vec3 normal);
+
 /// The derivatives of the common volume by the numbers of each body's shape, in the order of its fields.
 ///
 /// - A box has its half extents, a sphere and a rounded hull the radius.
 /// - A capsule and a cylinder have the radius and the length.
 /// - A half-space has the offset along its unit normal.
 ///
-/// NaN for ellipsoids and hulls, for the length 0, and for groups of three with a round body. NaN also for flat faces
-/// and ends of bodies that overlap an ellipsoid.
+/// NaN for ellipsoids and hulls; vertex_gradients() has the derivatives by a hull's vertices. NaN also for the length
+/// 0, and for flat faces and ends of bodies that overlap an ellipsoid. Groups with a round body have the numbers of the
+/// polytope that encloses the common set.
 ///
 /// A surface moves along its normal at some speed. The volume grows at the rate of the integral of that speed over the
 /// part of the surface that the body owns. The sides of a box across one axis move at the speed 1 if that half extent
 /// grows. The derivative is therefore the area of these sides in the boundary of the common set.
 std::vector<Vec3> shape_gradient(const Overlap& overlap);
+
+/// m²: bounds of the errors of shape_gradient(). They are the bounds of the areas that bodies own. For boxes, the
+/// difference from a second way is added. NaN where there is no derivative.
+std::vector<Vec3> shape_gradient_errors(const Overlap& overlap);
 
 /// The volume of a pair and its derivatives.
 struct PairGradient {

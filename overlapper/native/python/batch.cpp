@@ -264,6 +264,13 @@ void define_columns(nb::class_<Overlaps>& cls) {
       },
       nb::rv_policy::reference, nb::sig("def patch_area(self) -> numpy.typing.NDArray[numpy.float64]"),
       "(p, 3) m², the area vector of the patch, from b to a; zeros unless overlapping.");
+  define_column<ShapeGradients>(
+      cls, "shape_gradient",
+      [](const Overlaps& overlaps) -> const auto& {
+        return unlocked([&]() -> const std::vector<ShapeGradients>& { return overlaps.shape_gradients(); });
+      },
+      R"((p, 2, 3) derivatives of the volume by the sizes of a and of b, m², as Overlap.shape_gradient; zeros unless
+overlapping. The first use takes some microseconds for each pair of polyhedra.)");
   define_patch_column(cls, "patch_centre", &Overlaps::Patches::centre,
                       R"((p, 3) m, the centre of that area in the plane through the centroid; NaN without an area. The
 first use of the centre, the moments or the distance takes some microseconds for each pair.)");

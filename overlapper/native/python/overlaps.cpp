@@ -6,6 +6,7 @@
 #include "methods/half_spaces_alone.h"
 #include "overlap/overlap.h"
 #include "overlap/shape_gradient.h"
+#include "overlap/vertex_gradient.h"
 #include "python/arrays.h"
 #include "shapes/canonical_order.h"
 
@@ -195,6 +196,18 @@ inertia and gradient were then computed again in double-double arithmetic, from 
 of the facets that the body owns, and its moment. m² and m³; zeros unless overlapping.)");
 }
 
+/// A list with an array for each hull: the derivatives by its vertices, or the bounds of their errors.
+nb::list by_vertices(const Overlap& o, bool errors) {
+  nb::list list;
+  for (VertexGradient& each : computed_of(o.bodies(), [&] { return vertex_gradients(o, errors); })) {
+    const size_t count = each.by_vertex.size();
+    if (count == 0) list.append(nb::none());
+    else if (errors) list.append(nb::cast(to_numpy<Vector>(std::move(each.error), {count}), nb::rv_policy::move));
+    else list.append(nb::cast(to_numpy(each.by_vertex), nb::rv_policy::move));
+  }
+  return list;
+}
+
 void define_shape_gradient(nb::class_<Overlap>& cls) {
   array_property(
       cls, "shape_gradient",
@@ -202,11 +215,20 @@ void define_shape_gradient(nb::class_<Overlap>& cls) {
         return to_numpy(std::span<const Vec3>(computed_of(o.bodies(), [&] { return shape_gradient(o); })));
       },
       R"((m, 3) d volume / d (half extents) of each box, m². For a half-space, d volume / d (offset along its unit normal), then
-zeros. For round bodies of a pair: d volume / d radius of a sphere or a rounded hull, then zeros; d volume / d (radius,
-length) of a capsule or a cylinder, then zero. It is the integral over the common surface of the speed at which the surface
-moves out. Where faces of two bodies lie in one plane, the volume has two one-sided derivatives, and the area counts for
-either body. NaN for hulls and ellipsoids, for boxes, cylinders and lengths of bodies that overlap an ellipsoid, for a
-length of 0, and for groups with a round body; zeros unless overlapping.)");
+zeros. For round bodies: d volume / d radius of a sphere or a rounded hull, then zeros; d volume / d (radius, length) of a
+capsule or a cylinder, then zero. It is the integral over the common surface of the speed at which the surface moves out.
+Where faces of two bodies lie in one plane, the volume has two one-sided derivatives, and the area counts for either body.
+For groups with a round body, it is that of an enclosing polytope. NaN for ellipsoids and for hulls, which have
+`vertex_gradients`; for boxes, cylinders and lengths of bodies that overlap an ellipsoid; for a length of 0. Zeros unless
+overlapping. `errors.shape_gradient` bounds the errors.)");
+  cls.def_prop_ro(
+      "vertex_gradients", [](const Overlap& o) { return by_vertices(o, false); },
+      nb::sig("def vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]"),
+      R"(For each body, the (k, 3) d volume / d (position of a vertex), world axes, m², of the rows of `Hull.vertices`; None
+for a body that is no hull. The vertices of a body have the sum gradient[i, :3]. A facet of more than three corners counts as
+a fan of triangles from its first corner. The volume has other one-sided derivatives there, as a vertex that leaves the facet
+may fold it in another way. NaN if the hull overlaps a round body; zeros unless overlapping. `errors.vertex_gradients` bounds
+the errors.)");
 }
 
 /// The error bounds of an overlap.
@@ -214,6 +236,7 @@ struct ErrorsOf {
   Errors errors;
   bool solid;
   std::optional<ContactErrors> contact;  ///< only for a pair
+  Overlap overlap;                       ///< for bounds that are computed on demand
 };
 
 std::string repr(const ErrorsOf& e) {
@@ -260,6 +283,18 @@ overlapping.)");
 Where facets of two bodies lie in one plane, the volume has two one-sided derivatives, and the gradient may be either.
 The error bound is then as large as the facet. Where surfaces are nearly tangent, rounding errors move the border between
 them much farther than their own size.)");
+  array_property(
+      cls, "shape_gradient",
+      [](const ErrorsOf& e) {
+        return to_numpy(
+            std::span<const Vec3>(computed_of(e.overlap.bodies(), [&] { return shape_gradient_errors(e.overlap); })));
+      },
+      "(m, 3) m², for each entry. NaN where there is no derivative. Computed on each access.");
+  cls.def_prop_ro(
+      "vertex_gradients", [](const ErrorsOf& e) { return by_vertices(e.overlap, true); },
+      nb::sig("def vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]"),
+      R"(For each body, (k,) m²: bounds of the lengths of the errors of the rows; None for a body that is no hull. Computed on
+each access.)");
   cls.def_prop_ro(
       "depth", [](const ErrorsOf& e) { return of_contact(e, &ContactErrors::depth); },
       nb::sig("def depth(self) -> float | None"),
@@ -408,7 +443,7 @@ so the status is 'touching'. 'paper': the method `paper`.)");
       "errors",
       [](const Overlap& o) {
         return computed_of(o.bodies(), [&] {
-          return ErrorsOf{o.errors(), solid(o), o.pair() ? std::optional(o.contact_errors()) : std::nullopt};
+          return ErrorsOf{o.errors(), solid(o), o.pair() ? std::optional(o.contact_errors()) : std::nullopt, o};
         });
       },
       R"(Error bound of each quantity, as `volume_error` is that of the volume. They take about as long as all

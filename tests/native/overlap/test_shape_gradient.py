@@ -21,6 +21,7 @@ from overlapper import (
     Sphere,
     arrays,
     overlap,
+    overlaps,
     random_polytope,
 )
 
@@ -88,7 +89,7 @@ def test_half_spaces_and_numbers_without_a_derivative():
     assert_allclose(overlap(box, water).shape_gradient, [[2 * 4 * 3.5, 2 * 2 * 3.5, 8], [8, 0, 0]], rtol=1e-15)
     hull = overlap(Hull(random_polytope(20, rng=1).vertices), Box((0.3, 0.3, 0.3))).shape_gradient
     assert np.isnan(hull[0]).all() and np.isfinite(hull[1]).all()
-    assert np.isnan(overlap(Sphere(1.0), Sphere(1.0), Box((1, 1, 1))).shape_gradient).all()
+    assert np.isnan(overlap(Ellipsoid((1, 1, 2)), Sphere(1.0), Box((1, 1, 1))).shape_gradient[0]).all()
     apart = overlap(Box((1, 1, 1)), Placed(Box((1, 1, 1)), (5, 0, 0)))
     assert not apart.shape_gradient.any()
 
@@ -148,6 +149,66 @@ def test_a_ball_and_an_ellipsoid_have_the_derivative_by_the_radius_alone():
     assert found[0, 0] == pytest.approx((volumes[1] - volumes[0]) / 2e-4, rel=1e-6) and np.isnan(found[1]).all()
     assert np.isnan(overlap(Box((1, 1, 0.2)), Ellipsoid((0.4, 0.5, 0.6))).shape_gradient).all()
     assert np.isnan(overlap(Capsule(0.5, 0), Box((0.3, 0.3, 0.3))).shape_gradient[0, 1])
+
+
+@pytest.mark.parametrize("case", [case for case in PAIRS if case.truth.dimension == 3], ids=repr)
+def test_stated_errors_of_boxes_hold(case):
+    found = overlap(*case.placed)
+    for body in (0, 1):
+        off = np.abs(found.shape_gradient[body] - np.array(areas_of_sides(case, body), float))
+        assert (off <= found.errors.shape_gradient[body]).all()
+
+
+@pytest.mark.parametrize("kind", ROUND)
+def test_stated_errors_of_round_pairs_hold(kind):
+    # Euler: the volume has the degree 3 in all lengths.
+    rng = np.random.default_rng(8)
+    make, numbers = ROUND[kind]
+    for other, sizes in ((Sphere, (0.8,)), (Cylinder, (0.5, 0.9)), (lambda *half: Box(half), (0.5, 0.6, 0.7))):
+        found = overlap(make(*numbers), Placed(other(*sizes), rng.uniform(-0.4, 0.4, 3), quaternion(rng)))
+        stated = found.errors.shape_gradient
+        assert (stated[0, len(numbers) :] == 0).all() and (stated[0, : len(numbers)] > 0).all()
+        assert stated.max() <= 1e-8 * found.area
+        if kind != "rounded hull":
+            position = found.shapes[1].position
+            of_sizes = found.shape_gradient[0, : len(numbers)] @ numbers
+            of_sizes += found.shape_gradient[1, : len(sizes)] @ sizes
+            off = abs(of_sizes - found.gradient[0, :3] @ position - 3 * found.volume)
+            bound = stated[0, : len(numbers)] @ numbers + stated[1, : len(sizes)] @ sizes
+            assert off <= bound + 3 * found.volume_error + 3 * found.errors.gradient[0, 0] * np.linalg.norm(position)
+
+
+def test_groups_with_round_bodies_have_those_of_a_polytope():
+    rng = np.random.default_rng(9)
+    kinds = {**ROUND, "half-space": (lambda offset: HalfSpace((0, 0, 1), offset), (0.2,))}
+    others = [Placed(Box((0.7, 0.6, 0.5)), (0.1, 0, 0.1), quaternion(rng)), Placed(Sphere(0.7), (0.2, 0.1, 0))]
+    for made, numbers in kinds.values():
+        body = Placed(made(*numbers), (0.05, -0.1, 0), (0, 0, 0, 1))
+        found, step = overlap(body, *others, tolerance=1e-4), 1e-3
+        stated = found.errors.shape_gradient
+        assert np.isfinite(found.shape_gradient).all() and np.isfinite(stated).all()
+        for k in range(len(numbers)):
+            volumes = []
+            for side in (-1, 1):
+                moved = Placed(made(*(n + side * step * (i == k) for i, n in enumerate(numbers))), (0.05, -0.1, 0))
+                volumes.append(overlap(moved, *others, tolerance=1e-6).volume)
+            slope = (volumes[1] - volumes[0]) / (2 * step)
+            assert found.shape_gradient[0, k] == pytest.approx(slope, rel=5e-3, abs=1e-4)
+            assert abs(found.shape_gradient[0, k] - slope) <= stated[0, k] + 1e-4
+        assert not found.shape_gradient[0, len(numbers) :].any() and not stated[0, len(numbers) :].any()
+
+
+def test_rows_of_a_batch_have_those_of_their_overlaps():
+    rng = np.random.default_rng(4)
+    shapes = [Box((1, 0.5, 0.7)), HalfSpace((0, 0, 1), 0.1), Sphere(0.6), Box((0.6, 0.6, 0.6))]
+    positions = np.r_[rng.uniform(-0.3, 0.3, (3, 3)), [[9, 0, 0]]]
+    turns = np.array([quaternion(rng) for _ in shapes])
+    found = overlaps(shapes, positions, turns, pairs=[(0, 1), (0, 2), (1, 2), (0, 3)])
+    assert found.shape_gradient.shape == (4, 2, 3)
+    for row in range(4):
+        assert np.array_equal(found.shape_gradient[row], found[row].shape_gradient)
+    assert found.shape_gradient[:3].any(axis=2).all() and not found.shape_gradient[3].any()
+    assert np.array_equal(found[[2, 0]].shape_gradient, found.shape_gradient[[2, 0]])
 
 
 def test_three_boxes():

@@ -1,0 +1,137 @@
+#include "overlap/vertex_gradient.h"
+
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <limits>
+
+#include "geometry/cancellation.h"
+#include "overlap/shape_gradient.h"
+
+namespace overlapper {
+namespace {
+
+using Polygon = std::vector<Vec3>;
+
+/// The part of a convex polygon where dot(inwards, x - from) is not negative.
+void cut_off(Polygon& polygon, Vec3 inwards, Vec3 from, Polygon& kept) {
+  kept.clear();
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    const Vec3 p = polygon[i], q = polygon[i + 1 < polygon.size() ? i + 1 : 0];
+    const double before = dot(inwards, p - from), after = dot(inwards, q - from);
+    if (before >= 0) kept.push_back(p);
+    if ((before < 0) != (after < 0) && before != 0 && after != 0)
+      kept.push_back(p + before / (before - after) * (q - p));
+  }
+  polygon.swap(kept);
+}
+
+/// A facet's fan of triangles, and integrals over polygons in them.
+class HullSurface {
+ public:
+  HullSurface(const Placed& body, Vec3 reference) : hull_(*polytope_of(body.shape)) {
+    const Placed relative = body.seen_from(reference);
+    for (Vec3 v : hull_.vertices) vertices_.push_back(relative.pose * v);
+    for (const Plane& plane : hull_.planes) planes_.push_back(relative.pose * plane);
+    gradient_.resize(vertices_.size()), moved_.resize(vertices_.size()), area_.resize(vertices_.size());
+  }
+
+  /// Adds a polygon of the common surface, in the plane of a facet of this body.
+  void add(const Polygon& polygon, Vec3 normal) {
+    double size = 0;
+    for (Vec3 corner : polygon) size = std::max(size, norm(corner - polygon[0]));
+    // Facets whose planes are as near to the corners as the nearest plane is, but for rounding.
+    std::vector<double> off(planes_.size(), std::numeric_limits<double>::infinity());
+    double nearest = std::numeric_limits<double>::infinity();
+    for (size_t f = 0; f < planes_.size(); ++f) {
+      if (!(dot(planes_[f].normal, normal) > kAlike)) continue;
+      off[f] = 0;
+      for (Vec3 corner : polygon) off[f] = std::max(off[f], std::abs(signed_distance(planes_[f], corner)));
+      nearest = std::min(nearest, off[f]);
+    }
+    for (size_t f = 0; f < planes_.size(); ++f)
+      if (off[f] <= 2 * nearest + kRounding * size) add_in_facet(static_cast<int>(f), polygon);
+  }
+
+  VertexGradient found(double owned, double misplaced, bool with_errors) const {
+    VertexGradient result{gradient_, {}};
+    if (!with_errors) return result;
+    for (size_t v = 0; v < moved_.size(); ++v)
+      result.error.push_back(owned + std::min(misplaced * moved_[v], area_[v]));
+    return result;
+  }
+
+ private:
+  static constexpr double kAlike = 0.5, kRounding = 64 * DBL_EPSILON;
+
+  void add_in_facet(int facet, const Polygon& polygon) {
+    const auto ring = hull_.facet(facet);
+    for (size_t i = 1; i + 1 < ring.size(); ++i) {
+      cancellation_point();
+      add_in_triangle({ring[0], ring[i], ring[i + 1]}, planes_[facet].normal, polygon);
+    }
+  }
+
+  void add_in_triangle(const std::array<int, 3>& corners, Vec3 normal, const Polygon& polygon) {
+    const auto at = [&](int k) { return vertices_[corners[k % 3]]; };
+    const double twice = dot(cross(at(1) - at(0), at(2) - at(0)), normal);
+    if (!(twice > 0)) return;
+    part_ = polygon;
+    for (int k = 0; k < 3; ++k) cut_off(part_, cross(normal, at(k + 1) - at(k)), at(k), spare_);
+    double area = 0;
+    Vec3 first;
+    for (size_t i = 1; i + 1 < part_.size(); ++i) {
+      const double piece = dot(cross(part_[i] - part_[0], part_[i + 1] - part_[0]), normal) / 2;
+      area += piece, first += piece / 3 * ((part_[0] - at(0)) + (part_[i] - at(0)) + (part_[i + 1] - at(0)));
+    }
+    if (!(area > 0)) return;
+    double longest = 0;
+    for (int k = 0; k < 3; ++k) longest = std::max(longest, norm(at(k + 1) - at(k)));
+    // Barycentric coordinates, integrated: each is the distance from the side across the corner, over the height.
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 inwards = cross(normal, at(k + 2) - at(k + 1));
+      const double share = (dot(inwards, first) + area * dot(inwards, at(0) - at(k + 1))) / twice;
+      gradient_[corners[k]] += std::clamp(share, 0.0, area) * normal;
+      moved_[corners[k]] += area * longest / twice, area_[corners[k]] += area;
+    }
+  }
+
+  const HullData& hull_;
+  std::vector<Vec3> vertices_;  ///< about the reference
+  std::vector<Plane> planes_;
+  std::vector<Vec3> gradient_;
+  std::vector<double> moved_;  ///< m: how the error grows with a corner's displacement
+  std::vector<double> area_;   ///< m², of the triangles around each vertex
+  Polygon part_, spare_;
+};
+
+}  // namespace
+
+std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_errors) {
+  const std::span<const Placed> bodies = overlap.bodies();
+  std::vector<VertexGradient> found(bodies.size());
+  const bool overlapping = overlap.status() == Status::kOverlapping, known = polyhedral(bodies);
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    if (smooth(bodies[i].shape) || !polytope_of(bodies[i].shape)) continue;
+    const size_t count = polytope_of(bodies[i].shape)->vertices.size();
+    const double value = known || !overlapping ? 0 : kNoDerivative;
+    found[i].by_vertex.assign(count, {value, value, value});
+    if (with_errors) found[i].error.assign(count, overlapping ? value : overlap.errors().gradient[i][0]);
+    if (!known || !overlapping) continue;
+    const Vec3 reference = overlap.centroid();
+    const Boundary& boundary = overlap.boundary();
+    HullSurface surface(bodies[i], reference);
+    Polygon polygon;
+    for (int f = 0; f < static_cast<int>(boundary.planes.size()); ++f) {
+      if (boundary.owner[f] != static_cast<int>(i)) continue;
+      polygon.clear();
+      for (int v : boundary.facet(f)) polygon.push_back(boundary.vertices[v] - reference);
+      surface.add(polygon, boundary.planes[f].normal);
+    }
+    const double owned = with_errors ? overlap.errors().gradient[i][0] : 0;
+    found[i] = surface.found(owned, with_errors ? overlap.errors().vertices : 0, with_errors);
+  }
+  return found;
+}
+
+}  // namespace overlapper

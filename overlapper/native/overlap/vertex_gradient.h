@@ -1,0 +1,28 @@
+#pragma once
+
+#include <vector>
+
+#include "overlap/overlap.h"
+
+namespace overlapper {
+
+/// The derivatives of the common volume by the vertices of one hull.
+struct VertexGradient {
+  std::vector<Vec3> by_vertex;  ///< m², for each vertex of HullData
+  std::vector<double> error;    ///< m²: bound of the length of the error of each; empty unless wanted
+};
+
+/// For each body, the derivatives by the vertices of its hull. No vertices for a body that is no hull. NaN if the hull
+/// overlaps a round body.
+///
+/// If a vertex moves, points of its facets move along with their barycentric coordinates. The derivative is the
+/// integral of a vertex's coordinate times the normal over the part of the surface that the body owns. A facet of more
+/// than three corners counts as a fan of triangles from its first corner. The volume has other one-sided derivatives
+/// there, for vertices that leave the facet in other ways. All of them agree for vertices that stay in one plane.
+///
+/// Two bounds add up to an error. Area may belong to another body, or be missing, as bounded by Errors::gradient.
+/// Corners may be misplaced, as bounded by Errors::vertices. They change a coordinate by that distance over the height
+/// of the triangle.
+std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_errors);
+
+}  // namespace overlapper

@@ -1,0 +1,106 @@
+"""The derivatives of the volume by the vertices of hulls: rational arithmetic, and differences of exact volumes."""
+
+from fractions import Fraction
+from itertools import pairwise
+
+import exact
+import numpy as np
+import pytest
+from families import make
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+from strategies import quaternion
+
+from overlapper import Box, HalfSpace, Hull, Placed, Sphere, overlap, random_polytope
+
+
+def by_vertices(case, body):
+    """The derivative by each vertex of a hull of triangles, without rounding.
+
+    Over a triangle of the common surface, the mean of a barycentric coordinate is its value at the centroid.
+    """
+    found = {point: exact.vector((0, 0, 0)) for point in case.solids[body].vertices}
+    corners_of = {facet.plane: facet.ring for facet in case.solids[body].facets}
+    for facet in case.truth.facets:
+        if facet.owners != (body,):
+            continue
+        ring = corners_of[facet.plane]
+        corners = [exact.coordinates(p) for p in ring]
+        normal = tuple(map(Fraction, facet.plane[:3]))
+        whole = exact.dot(exact.cross(*(exact.subtract(c, corners[0]) for c in corners[1:])), normal)
+        part = [exact.coordinates(p) for p in facet.ring]
+        for q, r in pairwise(part[1:]):
+            area = exact.cross(exact.subtract(q, part[0]), exact.subtract(r, part[0]))
+            middle = tuple((x + y + z) / 3 for x, y, z in zip(part[0], q, r))
+            for k in range(3):
+                side = exact.subtract(corners[k - 1], corners[k - 2])
+                share = exact.dot(exact.cross(side, exact.subtract(middle, corners[k - 2])), normal) / whole
+                found[ring[k]] = exact.add(found[ring[k]], tuple(share * each / 2 for each in area))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_vertices_of_hulls_of_triangles_against_rational_arithmetic(seed):
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.integers(-3, 3)
+    clouds = [size * (rng.normal(size=(n, 3)) + 0.5 * rng.normal(size=3)) for n in (6, 14)]
+    case = type(make("general", 0))("random", 0, tuple(clouds))
+    if case.truth.dimension < 3:
+        return
+    found = overlap(*case.placed)
+    for body in (0, 1):
+        exactly = by_vertices(case, body)
+        rows = case.placed[body].vertices if isinstance(case.placed[body], Hull) else Hull(clouds[body]).vertices
+        expected = np.array([[float(x) for x in exactly[exact.point(p)]] for p in rows])
+        off = np.linalg.norm(found.vertex_gradients[body] - expected, axis=1)
+        assert off.max() <= 1e-12 * case.truth.area
+        assert (off <= found.errors.vertex_gradients[body]).all()
+        assert found.errors.vertex_gradients[body].max() <= 1e-8 * case.truth.area
+        assert_allclose(found.vertex_gradients[body].sum(0), found.gradient[body, :3], atol=1e-13 * case.truth.area)
+
+
+def test_a_moved_vertex_against_differences_of_exact_volumes():
+    # The volume is a polynomial in the place of a vertex until the next corner passes a plane.
+    rng = np.random.default_rng(5)
+    points, other = rng.normal(size=(8, 3)), exact.hull(rng.normal(size=(9, 3)) + 0.3)
+    hull = Hull(points)
+    found = overlap(hull, Hull([[float(x) for x in exact.coordinates(p)] for p in other.vertices])).vertex_gradients[0]
+    step = Fraction(1, 2**60)
+    for v, vertex in enumerate(hull.vertices):
+        for axis in range(3):
+            volumes = []
+            for side in (-1, 1):
+                cloud = [list(exact.vector(p)) for p in hull.vertices]
+                cloud[v][axis] += side * step
+                volumes.append(exact.common(exact.hull(cloud), other).volume)
+            assert found[v, axis] == pytest.approx(float((volumes[1] - volumes[0]) / (2 * step)), abs=1e-13), vertex
+
+
+@pytest.mark.parametrize("others", [1, 2])
+def test_a_box_as_a_hull_has_the_derivatives_of_the_box(others):
+    # Facets of four corners: stretching along an axis keeps them flat.
+    rng = np.random.default_rng(6)
+    for _ in range(6):
+        half, position, turn = rng.uniform(0.5, 1, 3), rng.uniform(-0.5, 0.5, 3), quaternion(rng)
+        rest = [Placed(Box(rng.uniform(0.5, 1, 3)), rng.uniform(-0.4, 0.4, 3), quaternion(rng)) for _ in range(others)]
+        corners = half * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        hull = Hull(corners)
+        by_size = overlap(Placed(Box(half), position, turn), *rest).shape_gradient[0]
+        found = overlap(Placed(hull, position, turn), *rest)
+        own = Rotation.from_quat(turn).inv().apply(found.vertex_gradients[0])
+        assert_allclose((own * hull.vertices / half).sum(0), by_size, rtol=0, atol=1e-13)
+        assert found.vertex_gradients[1:] == [None] * others
+
+
+def test_vertices_that_the_other_body_does_not_reach():
+    hull = Hull(random_polytope(30, rng=1).vertices)
+    whole = overlap(hull, Box((9, 9, 9)))
+    assert_allclose((whole.vertex_gradients[0] * hull.vertices).sum(), 3 * hull.volume, rtol=1e-12)
+    half = overlap(hull, HalfSpace((0, 0, 1), 0.0))
+    reached = np.linalg.norm(half.vertex_gradients[0], axis=1) > 0
+    assert reached[hull.vertices[:, 2] < 0].all() and not reached.all()
+    assert not overlap(hull, Placed(hull, (9, 0, 0))).vertex_gradients[1].any()
+    assert overlap(hull, Placed(hull, (9, 0, 0))).errors.vertex_gradients[0].shape == (len(hull.vertices),)
+    assert np.isnan(overlap(hull, Sphere(0.5)).vertex_gradients[0]).all()
+    assert np.isnan(overlap(hull, Sphere(0.5)).errors.vertex_gradients[0]).all()
+    assert overlap(Sphere(1), Box((1, 1, 1))).vertex_gradients == [None, None]
