@@ -723,6 +723,21 @@ class Overlap:
         """
 
     @property
+    def hessian(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (6 m, 6 m) second derivatives of the volume by the numbers of `gradient`, in its order: a translation, and a rotation
+        vector about the body's own position, of each body. The matrix is symmetric. The volume after a small motion x of all bodies is
+        volume + gradient.ravel() @ x + x @ hessian @ x / 2. NaN where a face of one body lies in the plane of a face of another body:
+        there the volume has a kink. Where an edge lies in the plane of a face, it is one of two one-sided values. m, m² and m³; zeros
+        unless overlapping.
+
+        Raises
+        ------
+        ValueError
+            If a body is round.
+        """
+
+    @property
     def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """(n, 3) vertices of the common polytope, m; empty unless overlapping."""
 
@@ -1042,6 +1057,13 @@ class Overlaps:
         """
         (p, 2, 3) derivatives of the volume by the sizes of a and of b, m², as Overlap.shape_gradient; zeros unless
         overlapping. The first use takes some microseconds for each pair of polyhedra.
+        """
+
+    @property
+    def hessian(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 12, 12) second derivatives of the volume by the twelve numbers of `gradient`, as Overlap.hessian; NaN for pairs
+        with a round body, zeros unless overlapping. The first use takes some tens of microseconds for each pair.
         """
 
     @property

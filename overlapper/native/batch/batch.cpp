@@ -14,6 +14,7 @@
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
 #include "methods/round/closed_forms/closed_forms.h"
+#include "overlap/second_derivatives.h"
 #include "overlap/shape_gradient.h"
 #include "shapes/planes_asked.h"
 
@@ -156,6 +157,17 @@ const std::vector<ShapeGradients>& Overlaps::shape_gradients() const {
     for (size_t row = 0; row < size(); ++row)
       if (status[row] == static_cast<std::int8_t>(Status::kOverlapping))
         std::ranges::copy(shape_gradient(*overlap(row)), found[row].begin());
+    return found;
+  });
+}
+
+const std::vector<PoseHessian>& Overlaps::hessians() const {
+  return hessians_->get([this] {
+    std::vector<PoseHessian> found(size());
+    for (size_t row = 0; row < size(); ++row) {
+      const std::vector<double> numbers = pose_hessian(*overlap(row));
+      for (size_t k = 0; k < numbers.size(); ++k) found[row][k / 12][k % 12] = numbers[k];
+    }
     return found;
   });
 }

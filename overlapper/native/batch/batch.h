@@ -24,6 +24,8 @@ using BodyGradients = std::array<std::array<double, 6>, 2>;
 
 /// The derivatives of the volume by the numbers of the shapes of a and of b, as in shape_gradient().
 using ShapeGradients = std::array<Vec3, 2>;
+/// The second derivatives of the volume by the twelve numbers of BodyGradients.
+using PoseHessian = std::array<std::array<double, 12>, 12>;
 
 /// The common sets of the pairs of one call, a column per quantity and a row per pair.
 struct Overlaps {
@@ -70,6 +72,7 @@ struct Overlaps {
   /// Computed on first use, pair by pair.
   const Patches& patches() const;
   const std::vector<ShapeGradients>& shape_gradients() const;
+  const std::vector<PoseHessian>& hessians() const;  ///< NaN for pairs with a round body
   /// The patch of a row. It is seen along a unit direction if one is given.
   Patch patch(size_t row, const std::optional<Vec3>& direction = {}) const;
 
@@ -80,6 +83,7 @@ struct Overlaps {
   using Shared = std::shared_ptr<Once<T>>;
   Shared<Patches> patches_ = std::make_shared<Once<Patches>>();
   Shared<std::vector<ShapeGradients>> shape_gradients_ = std::make_shared<Once<std::vector<ShapeGradients>>>();
+  Shared<std::vector<PoseHessian>> hessians_ = std::make_shared<Once<std::vector<PoseHessian>>>();
 };
 
 /// A column of Overlaps: its name in Python, its vector, the value of a row, and its docstring in Python.

@@ -53,8 +53,9 @@ class Overlap {
   bool widened() const;        ///< true if doubles were not accurate enough
   int facets_touched() const;  ///< number of planes in the measures
 
-  /// The polytope of the common set. This and the next three are only for overlapping bodies.
+  /// The polytope of the common set. This and the next four are only for overlapping bodies.
   const Region& region() const;
+  const Region& drawn() const;  ///< of the boundary: the finest if doubles do not place planes well enough
   const Measures& measures() const;
   /// Inertia tensor about the centroid, unit density; by slices if the measures have closed forms.
   Mat3 inertia() const;
@@ -111,7 +112,6 @@ class Overlap {
   OverlappingBodies overlapping_bodies() const;
   MeasuresAndInertia measured_in_full() const;
   const Region& finest_region() const;
-  const Region& drawn() const;  ///< for the boundary: the finest if doubles do not place planes well enough
   Stated stated() const;
   const Overlap& judge_of_paper() const;
   Errors errors_of_paper() const;

@@ -5,6 +5,7 @@
 #include "distance/penetration.h"
 #include "methods/half_spaces_alone.h"
 #include "overlap/overlap.h"
+#include "overlap/second_derivatives.h"
 #include "overlap/shape_gradient.h"
 #include "overlap/vertex_gradient.h"
 #include "python/arrays.h"
@@ -206,6 +207,26 @@ nb::list by_vertices(const Overlap& o, bool errors) {
     else list.append(nb::cast(to_numpy(each.by_vertex), nb::rv_policy::move));
   }
   return list;
+}
+
+void define_hessian(nb::class_<Overlap>& cls) {
+  array_property(
+      cls, "hessian",
+      [](const Overlap& o) {
+        if (!polyhedral(o.bodies())) fail("hessian", "exists for boxes, hulls and half-spaces, not for round bodies");
+        const size_t width = 6 * o.bodies().size();
+        return to_numpy<Matrix>(computed_of(o.bodies(), [&] { return pose_hessian(o); }), {width, width});
+      },
+      R"((6 m, 6 m) second derivatives of the volume by the numbers of `gradient`, in its order: a translation, and a rotation
+vector about the body's own position, of each body. The matrix is symmetric. The volume after a small motion x of all bodies is
+volume + gradient.ravel() @ x + x @ hessian @ x / 2. NaN where a face of one body lies in the plane of a face of another body:
+there the volume has a kink. Where an edge lies in the plane of a face, it is one of two one-sided values. m, m² and m³; zeros
+unless overlapping.
+
+Raises
+------
+ValueError
+    If a body is round.)");
 }
 
 void define_shape_gradient(nb::class_<Overlap>& cls) {
@@ -450,6 +471,7 @@ so the status is 'touching'. 'paper': the method `paper`.)");
 quantities together.)");
   define_measures(cls);
   define_shape_gradient(cls);
+  define_hessian(cls);
   define_boundary(cls);
   define_contact(cls);
   cls.def("__repr__", [](const Overlap& o) { return repr(o); });
