@@ -1476,6 +1476,13 @@ def volume_gradients(a: ShapeArray, b: ShapeArray, weights: numpy.typing.ArrayLi
     shape as in Overlap.shape_gradient, (n, 3) by the position, and (n, 3) by a rotation vector about the position.
     """
 
+def volume_second_derivatives(a: ShapeArray, b: ShapeArray, weights: numpy.typing.ArrayLike, along_a: numpy.typing.ArrayLike, along_b: numpy.typing.ArrayLike, aligned: bool, tolerance: float, threads: int | None) -> tuple[numpy.typing.NDArray[numpy.float64], tuple[numpy.typing.NDArray[numpy.float64], ...], tuple[numpy.typing.NDArray[numpy.float64], ...]]:
+    """
+    The second derivatives of the weighted sum of common volumes of polyhedra, times a direction, as `volume_gradients`
+    arranges them. Before them, flat, the derivative of each pair's volume along the direction. A row of `along_a` (n, 9) and
+    `along_b` (m, 9) has the numbers of the shape, the position and the rotation vector.
+    """
+
 class ContactSolver:
     """
     The forces of patches on bodies of links; `simulation.VolumetricContact` is made of it.

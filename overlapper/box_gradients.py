@@ -46,6 +46,37 @@ def gradients(six: Sequence[Any], weights: Any, aligned: bool, threads: int | No
     ]
 
 
+def second_derivatives(
+    six: Sequence[Any], weights: Any, cotangents: Sequence[Any], aligned: bool, threads: int | None
+) -> tuple[Numbers, list[Numbers]]:
+    """The derivatives of sum(cotangents * gradients(six, weights)): by the weights, and by each number of the six.
+
+    NaN where a face of one box lies in the plane of a face of the other.
+    """
+    rows, stack, shape = _stacked(six, aligned)
+    count = math.prod(stack)
+    weights = np.reshape(np.asarray(weights, dtype=float), (1, count) if aligned else (count, *shape))
+    along = _stacked(cotangents, aligned)[0]
+    by_weights, sums = [], [[] for _ in six]  # type: tuple[list[Numbers], list[list[Numbers]]]
+    for each, by, to in zip(zip(*rows), weights, zip(*along)):
+        both = _both(each)
+        turns = [by_quaternion_along(each[k], to[k]) for k in (2, 5)]
+        along_a, along_b = (np.hstack([to[k] / 2, to[k + 1], turn]) for k, turn in zip((0, 3), turns))
+        slopes, *second = _core.volume_second_derivatives(*both, by, along_a, along_b, aligned, 1e-3, threads)
+        by_weights.append(slopes)
+        first = _core.volume_gradients(*both, by, aligned, 1e-3, threads)
+        for body, (shape_, position, rotation) in enumerate(second):
+            k, moment = 3 * body, first[body][2]
+            # A second turn is about axes that the first turn leaves where they are.
+            rotation = rotation + np.cross(moment, turns[body]) / 2
+            quaternion = by_quaternion(each[k + 2], rotation) + _bend(each[k + 2], to[k + 2], moment)
+            for i, found in enumerate((shape_ / 2, position, quaternion)):
+                sums[k + i].append(found)
+    return np.reshape(by_weights, stack + shape), [
+        np.reshape(found, np.shape(given)) if found else np.zeros(np.shape(given)) for found, given in zip(sums, six)
+    ]
+
+
 def check(six: Sequence[Any], aligned: bool) -> None:
     """Raises ValueError unless the shapes of the arrays fit."""
     for name, each, width in zip("aaabbb", six, WIDTHS * 2):
@@ -61,9 +92,10 @@ def check(six: Sequence[Any], aligned: bool) -> None:
         raise ValueError("a and b must have the same number of rows if they are aligned")
 
 
-def tangents(quaternions: Numbers) -> Numbers:
-    """(n, 3, 4) the derivatives of unit quaternions xyzw by a rotation vector in the world."""
-    x, y, z, w = np.moveaxis(quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True), -1, 0)
+def tangents(quaternions: Numbers, unit: bool = True) -> Numbers:
+    """(n, 3, 4) the derivatives of quaternions xyzw by a rotation vector in the world; of unit length with `unit`."""
+    length = np.linalg.norm(quaternions, axis=-1, keepdims=True) if unit else 1.0
+    x, y, z, w = np.moveaxis(quaternions / length, -1, 0)
     rows = [[w, -z, y, -x], [z, w, -x, -y], [-y, x, w, -z]]
     return np.moveaxis(0.5 * np.array(rows), -1, 0)
 
@@ -76,6 +108,23 @@ def by_quaternion(quaternions: Numbers, by_rotation: Numbers) -> Numbers:
     """
     length = np.linalg.norm(quaternions, axis=-1, keepdims=True)
     return np.asarray(4 * np.einsum("nkj,nk->nj", tangents(quaternions), by_rotation) / length)
+
+
+def by_quaternion_along(quaternions: Numbers, along: Numbers) -> Numbers:
+    """(n, 3) rotation vectors of small changes `along` (n, 4) of quaternions of any length."""
+    length = np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    return np.asarray(4 * np.einsum("nkj,nj->nk", tangents(quaternions), along) / length)
+
+
+def _bend(quaternions: Numbers, along: Numbers, moment: Numbers) -> Numbers:
+    """(n, 4) derivatives of sum(by_quaternion_along(quaternions, along) * moment) by the quaternions.
+
+    The rotation vector is 4 T(q) c / |q|², where T(q) c is linear in both q and c, and T(q) c = -T(c) q.
+    """
+    square = (quaternions**2).sum(-1, keepdims=True)
+    slope = (by_quaternion_along(quaternions, along) * moment).sum(-1, keepdims=True)
+    turned = np.einsum("nkj,nk->nj", tangents(along, unit=False), moment)
+    return np.asarray(-2 * slope * quaternions / square - 4 * turned / square)
 
 
 def corner_gradients(fitted: Sequence[Any], by_size: Numbers, by_position: Numbers, by_quaternion: Numbers) -> Numbers:

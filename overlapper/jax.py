@@ -1,7 +1,8 @@
 """Common volumes and IoU of oriented boxes as differentiable functions of JAX arrays, under `jit` and `vmap`.
 
 The numbers are computed on the processor in float64 by `jax.pure_callback`. Results have the dtype of the sizes of `a`.
-There are first derivatives in reverse mode only.
+There are first and second derivatives, in reverse mode only: `jax.jacrev(jax.grad(f))`, not `jax.hessian(f)`. A second
+derivative is NaN where a face of one box lies in the plane of a face of the other.
 """
 
 from __future__ import annotations
@@ -117,13 +118,32 @@ def _forward(a: Any, b: Any, aligned: bool, threads: int | None) -> Any:
 
 
 def _backward(aligned: bool, threads: int | None, kept: Any, upstream: Any) -> Any:
-    six = [*kept[0], *kept[1]]
-    answer = jax.eval_shape(lambda: tuple(jnp.empty(each.shape, each.dtype) for each in six))
-    found = jax.pure_callback(_slopes(aligned, threads), answer, upstream, *six, vmap_method="broadcast_all")
+    found = _gradients(upstream, (*kept[0], *kept[1]), aligned, threads)
     return tuple(found[:3]), tuple(found[3:])
 
 
 _volume.defvjp(_forward, _backward)
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(2, 3))
+def _gradients(upstream: Any, six: Any, aligned: bool, threads: int | None) -> Any:
+    answer = jax.eval_shape(lambda: tuple(jnp.empty(each.shape, each.dtype) for each in six))
+    return jax.pure_callback(_slopes(aligned, threads), answer, upstream, *six, vmap_method="broadcast_all")
+
+
+def _gradients_forward(upstream: Any, six: Any, aligned: bool, threads: int | None) -> Any:
+    return _gradients(upstream, six, aligned, threads), (upstream, six)
+
+
+def _gradients_backward(aligned: bool, threads: int | None, kept: Any, along: Any) -> Any:
+    upstream, six = kept
+    answer = jax.eval_shape(lambda: tuple(jnp.empty(each.shape, each.dtype) for each in (upstream, *six)))
+    # The callback has no derivatives of its own, so JAX refuses a third derivative.
+    found = jax.pure_callback(_bends(aligned, threads), answer, upstream, *six, *along, vmap_method="broadcast_all")
+    return found[0], tuple(found[1:])
+
+
+_gradients.defvjp(_gradients_forward, _gradients_backward)
 
 
 # JAX compiles a call anew for every new function, so the functions are kept.
@@ -142,5 +162,14 @@ def _slopes(aligned: bool, threads: int | None) -> Any:
     def compute(weights: Any, *six: Any) -> Any:
         found = box_gradients.gradients(six, weights, aligned, threads)
         return tuple(each.astype(given.dtype) for each, given in zip(found, six))
+
+    return compute
+
+
+@cache
+def _bends(aligned: bool, threads: int | None) -> Any:
+    def compute(weights: Any, *twelve: Any) -> Any:
+        by_weights, by_six = box_gradients.second_derivatives(twelve[:6], weights, twelve[6:], aligned, threads)
+        return tuple(each.astype(given.dtype) for each, given in zip((by_weights, *by_six), (weights, *twelve)))
 
     return compute

@@ -1,7 +1,9 @@
 """Common volumes and IoU of oriented boxes as differentiable functions of torch tensors.
 
 The numbers are computed on the processor in float64. Tensors of a GPU are copied to the processor and back. Results
-have the dtype and the device of the sizes of `a`. There are first derivatives only.
+have the dtype and the device of the sizes of `a`. There are first and second derivatives; by the corners of
+`box3d_overlap` and `boxes_of_corners`, there are first derivatives only. A second derivative is NaN where a face of one
+box lies in the plane of a face of the other.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ except ImportError as error:
 __all__ = ["Boxes", "box3d_overlap", "boxes_of_corners", "corners", "iou", "volume"]
 
 
-NO_SECOND = "overlapper.torch has first derivatives only"
+NO_SECOND = "overlapper.torch has first derivatives only by corners"
+NO_THIRD = "overlapper.torch has first and second derivatives only"
 
 
 class Boxes(NamedTuple):
@@ -220,16 +223,33 @@ class _Volume(torch.autograd.Function):  # type: ignore[misc,unused-ignore]
 
 
 class _Slopes(torch.autograd.Function):  # type: ignore[misc,unused-ignore]
-    """First derivatives, whose own derivatives are refused: they would be zero without a word."""
+    """First derivatives of a weighted sum."""
 
     @staticmethod
     def forward(ctx: Any, upstream: Tensor, how: tuple[bool, int | None], *six: Tensor) -> tuple[Tensor, ...]:
+        ctx.save_for_backward(upstream, *six)
+        ctx.how = how
         found = box_gradients.gradients([each.numpy() for each in six], upstream.numpy(), *how)
         return tuple(map(_tensor, found))
 
     @staticmethod
+    def backward(ctx: Any, *along: Tensor) -> tuple[Any, ...]:
+        by_upstream, *by_six = _Bends.apply(ctx.how, *ctx.saved_tensors, *along)
+        return by_upstream, None, *by_six
+
+
+class _Bends(torch.autograd.Function):  # type: ignore[misc,unused-ignore]
+    """Second derivatives, whose own derivatives are refused: they would be zero without a word."""
+
+    @staticmethod
+    def forward(ctx: Any, how: tuple[bool, int | None], *tensors: Tensor) -> tuple[Tensor, ...]:
+        upstream, *arrays = (each.numpy() for each in tensors)
+        by_upstream, by_six = box_gradients.second_derivatives(arrays[:6], upstream, arrays[6:], *how)
+        return tuple(map(_tensor, (by_upstream, *by_six)))
+
+    @staticmethod
     def backward(ctx: Any, *upstream: Tensor) -> Any:
-        raise NotImplementedError(NO_SECOND)
+        raise NotImplementedError(NO_THIRD)
 
 
 class _Fit(torch.autograd.Function):  # type: ignore[misc,unused-ignore]

@@ -51,6 +51,41 @@ def test_derivatives_against_differences(function, aligned):
             np.testing.assert_allclose(found, slope, atol=1e-7)
 
 
+@pytest.mark.parametrize("function", [volume, iou])
+@pytest.mark.parametrize("aligned", [True, False])
+def test_second_derivatives_against_differences(function, aligned):
+    a, b = boxes(1, 3), boxes(2, 3)
+    weights = np.random.default_rng(0).normal(size=3 if aligned else (3, 3))
+    along = jax.tree.map(lambda each: np.random.default_rng(1).normal(size=each.shape), (a, b))
+
+    def slope(p, q):
+        """The derivative along a direction; the derivative of it also has that by the weights of the pairs."""
+        first = jax.grad(lambda *both: (weights * jnp.tanh(function(*both, aligned=aligned))).sum(), (0, 1))(p, q)
+        return sum((x * y).sum() for x, y in zip(jax.tree.leaves(first), jax.tree.leaves(along)))
+
+    for grad in (jax.grad(slope, (0, 1)), jax.jit(jax.grad(slope, (0, 1)))):
+        for found, expected in zip(jax.tree.leaves(grad(a, b)), slopes(slope, a, b)):
+            np.testing.assert_allclose(found, expected, atol=1e-6, rtol=1e-6)
+
+
+def test_second_derivatives_of_stacks_and_of_boxes_apart_or_flush():
+    a, b = boxes(1), boxes(2)
+
+    def bend(p, q):
+        return jax.jacrev(jax.grad(lambda x: volume(p._replace(positions=x), q, aligned=True)))(p.positions)
+
+    rows = jax.vmap(bend)(a, b)
+    for k in range(6):
+        first, second = (jax.tree.map(lambda each, k=k: each[k], boxes) for boxes in (a, b))
+        single = bend(first, second)
+        np.testing.assert_allclose(rows[k], single, rtol=1e-12)
+        np.testing.assert_allclose(single, single.T, atol=1e-12)
+    assert not jax.vmap(bend)(a, b._replace(positions=b.positions + 100)).any()
+    assert jnp.isnan(jax.vmap(bend)(a, a)).all()
+    with pytest.raises(ValueError, match="Pure callbacks do not support JVP"):
+        jax.grad(lambda x: bend(first._replace(positions=x), second).sum())(first.positions)
+
+
 def test_values_are_those_of_arrays():
     a, b = boxes(1), boxes(2, 4)
     numbers = [arrays.boxes(*map(np.asarray, each)) for each in (a, b)]

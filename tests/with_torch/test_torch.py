@@ -93,13 +93,36 @@ def test_boxes_that_are_apart_have_the_derivative_zero():
     assert not any(each.grad.any() for each in a)
 
 
-def test_a_second_derivative_is_refused():
+@pytest.mark.parametrize("function", [volume, iou])
+@pytest.mark.parametrize("aligned", [True, False])
+def test_gradgradcheck_by_size_position_and_quaternion(function, aligned):
+    a, b = boxes(1, 4), boxes(2, 4 if aligned else 2)
+    assert torch.autograd.gradgradcheck(
+        lambda *six: function(Boxes(*six[:3]), Boxes(*six[3:]), aligned=aligned), (*a, *b), eps=1e-6, atol=1e-5
+    )
+
+
+def test_second_derivatives_of_boxes_that_are_apart_or_flush():
+    a = boxes(1, 3)
+    apart = Boxes(*(each.detach() for each in a))._replace(positions=a.positions.detach() + 100)
+    for other, expected in ((apart, 0.0), (Boxes(*(each.detach() for each in a)), torch.nan)):
+        (slope,) = torch.autograd.grad(volume(a, other, aligned=True).sum(), a.positions, create_graph=True)
+        assert slope.isfinite().all()
+        (bend,) = torch.autograd.grad(slope.sum(), a.positions)
+        assert torch.equal(bend.nan_to_num(7), torch.full((3, 3), expected, dtype=torch.float64).nan_to_num(7))
+
+
+def test_derivatives_beyond_the_second_and_by_corners_beyond_the_first_are_refused():
     a, b = boxes(1), boxes(2)
+    (slope,) = torch.autograd.grad(volume(a, b).sum(), a.sizes, create_graph=True)
+    (bend,) = torch.autograd.grad(slope.sum(), a.sizes, create_graph=True)
+    with pytest.raises(NotImplementedError, match=r"^overlapper\.torch has first and second derivatives only$"):
+        bend.sum().backward()
     given = corners(a).detach().requires_grad_()
-    for shared, leaf in ((volume(a, b), a.sizes), (box3d_overlap(given, corners(b).detach())[0], given)):
-        (slope,) = torch.autograd.grad(shared.sum(), leaf, create_graph=True)
-        with pytest.raises(NotImplementedError, match=r"^overlapper\.torch has first derivatives only$"):
-            slope.sum().backward()
+    shared = box3d_overlap(given, corners(b).detach())[0]
+    (slope,) = torch.autograd.grad(shared.sum(), given, create_graph=True)
+    with pytest.raises(NotImplementedError, match=r"^overlapper\.torch has first derivatives only by corners$"):
+        slope.sum().backward()
 
 
 def test_boxes_are_fitted_to_boxes():

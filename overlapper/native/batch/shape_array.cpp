@@ -4,6 +4,7 @@
 
 #include "batch/parallel.h"
 #include "overlap/overlap.h"
+#include "overlap/second_derivatives.h"
 #include "overlap/shape_gradient.h"
 
 namespace overlapper {
@@ -78,38 +79,117 @@ bool for_pairs(const ShapeArray& a, const ShapeArray& b, Pairing pairing, bool c
   });
 }
 
-bool add_gradients(const ShapeArray& a, const ShapeArray& b, Pairing pairing, std::span<const double> weights,
-                   double tolerance, int threads, std::span<RowGradient> of_a, std::span<RowGradient> of_b) {
-  constexpr size_t kStretch = 1 << 14;  // pairs whose derivatives are kept until they are summed in order
-  const RowsOfPairs rows(a, b, true);
+namespace {
+
+constexpr size_t kStretch = 1 << 14;  // pairs whose derivatives are kept until they are summed in order
+
+/// The pairs of two arrays, and the place of each among the weights.
+std::vector<IndexPair> pairs_of(const RowsOfPairs& rows, Pairing pairing) {
+  if (pairing == Pairing::kAll) return pairs_that_meet(rows.a, rows.b);
   std::vector<IndexPair> pairs;
-  if (pairing == Pairing::kAll) pairs = pairs_that_meet(rows.a, rows.b);
-  else
-    for (int i = 0; i < static_cast<int>(a.size()); ++i) pairs.push_back({i, i});
-  const auto weight = [&](const IndexPair& pair) {
-    return weights[pairing == Pairing::kRows ? pair[0] : pair[0] * b.size() + pair[1]];
-  };
-  std::erase_if(pairs, [&](const IndexPair& pair) { return weight(pair) == 0; });
-  std::vector<PairGradient> found(std::min(kStretch, pairs.size()));
+  for (int i = 0; i < static_cast<int>(rows.a.size()); ++i) pairs.push_back({i, i});
+  return pairs;
+}
+size_t place_of(const IndexPair& pair, const RowsOfPairs& rows, Pairing pairing) {
+  return pairing == Pairing::kRows ? pair[0] : pair[0] * rows.b.size() + pair[1];
+}
+
+/// Calls `find(pair, place)` in parallel, and then `add(pair, place, found)` in order. False if the caller cancels.
+template <class Found, class Find, class Add>
+bool find_and_add(const std::vector<IndexPair>& pairs, int threads, const Find& find, const Add& add) {
+  std::vector<Found> found(std::min(kStretch, pairs.size()));
   for (size_t first = 0; first < pairs.size(); first += kStretch) {
     const size_t count = std::min(kStretch, pairs.size() - first);
     const bool finished = for_each_in_parallel(count, threads, [&](size_t k, int) {
-      const auto [i, j] = pairs[first + k];
-      found[k] = pair_gradient(rows.a[i], rows.b[j], tolerance);
+      found[k] = find(pairs[first + k]);
       return true;
     });
     if (!finished) return false;
-    for (size_t k = 0; k < count; ++k)
-      for (int body : {0, 1}) {
-        const double by = weight(pairs[first + k]);
-        const auto& pose = found[k].pose[body];
-        RowGradient& row = (body == 0 ? of_a : of_b)[pairs[first + k][body]];
-        row.shape += by * found[k].shape[body];
-        row.position += by * Vec3{pose[0], pose[1], pose[2]};
-        row.rotation += by * Vec3{pose[3], pose[4], pose[5]};
-      }
+    for (size_t k = 0; k < count; ++k) add(pairs[first + k], found[k]);
   }
   return true;
+}
+
+RowGradient row_of(const std::array<double, 6>& pose, Vec3 shape) {
+  return {shape, {pose[0], pose[1], pose[2]}, {pose[3], pose[4], pose[5]}};
+}
+RowGradient& add(RowGradient& row, double by, const RowGradient& other) {
+  row.shape += by * other.shape, row.position += by * other.position, row.rotation += by * other.rotation;
+  return row;
+}
+double dot(const RowGradient& a, const RowGradient& b) {
+  return overlapper::dot(a.shape, b.shape) + overlapper::dot(a.position, b.position) +
+         overlapper::dot(a.rotation, b.rotation);
+}
+
+/// The derivative of one pair's volume along a direction, and its second derivatives times that direction.
+struct AlongDirection {
+  double slope = 0;
+  std::array<RowGradient, 2> second{};
+};
+AlongDirection along_direction(const Placed& a, const Placed& b, const std::array<RowGradient, 2>& direction,
+                               double tolerance) {
+  AlongDirection found;
+  const PairGradient first = pair_gradient(a, b, tolerance);
+  if (first.volume == 0) return found;
+  std::array<double, 2 * kNumbersOfBody> along{};
+  for (int body : {0, 1}) {
+    const RowGradient& d = direction[body];
+    found.slope += dot(d, row_of(first.pose[body], first.shape[body]));
+    for (int k = 0; k < 3; ++k) {
+      double* numbers = &along[kNumbersOfBody * body];
+      numbers[k] = d.position[k], numbers[3 + k] = d.rotation[k], numbers[6 + k] = d.shape[k];
+    }
+  }
+  const std::vector<double> second = second_derivatives(Overlap(a, b, tolerance, Method::kAuto));
+  const auto product = [&](int k) {
+    double sum = 0;
+    for (size_t l = 0; l < along.size(); ++l) sum += second[k * along.size() + l] * along[l];
+    return sum;
+  };
+  for (int body : {0, 1}) {
+    const auto three = [&](int k) {
+      const int from = kNumbersOfBody * body + k;
+      return Vec3{product(from), product(from + 1), product(from + 2)};
+    };
+    found.second[body] = {three(6), three(0), three(3)};
+  }
+  return found;
+}
+
+}  // namespace
+
+bool add_gradients(const ShapeArray& a, const ShapeArray& b, Pairing pairing, std::span<const double> weights,
+                   double tolerance, int threads, std::span<RowGradient> of_a, std::span<RowGradient> of_b) {
+  const RowsOfPairs rows(a, b, true);
+  std::vector<IndexPair> pairs = pairs_of(rows, pairing);
+  const auto weight = [&](const IndexPair& pair) { return weights[place_of(pair, rows, pairing)]; };
+  std::erase_if(pairs, [&](const IndexPair& pair) { return weight(pair) == 0; });
+  return find_and_add<PairGradient>(
+      pairs, threads, [&](const IndexPair& pair) { return pair_gradient(rows.a[pair[0]], rows.b[pair[1]], tolerance); },
+      [&](const IndexPair& pair, const PairGradient& found) {
+        for (int body : {0, 1})
+          add((body == 0 ? of_a : of_b)[pair[body]], weight(pair), row_of(found.pose[body], found.shape[body]));
+      });
+}
+
+bool add_second_derivatives(const ShapeArray& a, const ShapeArray& b, Pairing pairing, std::span<const double> weights,
+                            std::span<const RowGradient> along_a, std::span<const RowGradient> along_b,
+                            double tolerance, int threads, std::span<double> slopes, std::span<RowGradient> of_a,
+                            std::span<RowGradient> of_b) {
+  const RowsOfPairs rows(a, b, true);
+  std::ranges::fill(slopes, 0);
+  return find_and_add<AlongDirection>(
+      pairs_of(rows, pairing), threads,
+      [&](const IndexPair& pair) {
+        return along_direction(rows.a[pair[0]], rows.b[pair[1]], {along_a[pair[0]], along_b[pair[1]]}, tolerance);
+      },
+      [&](const IndexPair& pair, const AlongDirection& found) {
+        const size_t place = place_of(pair, rows, pairing);
+        slopes[place] = found.slope;
+        if (weights[place] == 0) return;
+        for (int body : {0, 1}) add((body == 0 ? of_a : of_b)[pair[body]], weights[place], found.second[body]);
+      });
 }
 
 }  // namespace overlapper

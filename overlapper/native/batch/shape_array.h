@@ -48,4 +48,12 @@ struct RowGradient {
 bool add_gradients(const ShapeArray& a, const ShapeArray& b, Pairing pairing, std::span<const double> weights,
                    double tolerance, int threads, std::span<RowGradient> of_a, std::span<RowGradient> of_b);
 
+/// The second derivatives of the weighted sum of common volumes, times a direction with the numbers `along_a` and
+/// `along_b` of the rows. Adds them to the rows of both arrays. Writes each pair's first derivative along the direction
+/// to `slopes`, arranged as the weights. Otherwise as add_gradients().
+bool add_second_derivatives(const ShapeArray& a, const ShapeArray& b, Pairing pairing, std::span<const double> weights,
+                            std::span<const RowGradient> along_a, std::span<const RowGradient> along_b,
+                            double tolerance, int threads, std::span<double> slopes, std::span<RowGradient> of_a,
+                            std::span<RowGradient> of_b);
+
 }  // namespace overlapper

@@ -393,6 +393,50 @@ void define_gradients(nb::module_& m) {
 shape as in Overlap.shape_gradient, (n, 3) by the position, and (n, 3) by a rotation vector about the position.)");
 }
 
+/// Directions: a row of nine numbers for each row of an array, in the order of RowGradient.
+std::vector<RowGradient> to_directions(nb::handle given, const char* name, const ShapeArray& rows) {
+  const Rows numbers(given, name, 9, "(n, 9)");
+  numbers.must_have(rows.size(), rows.kind);
+  std::vector<RowGradient> directions;
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const double* d = numbers[i];
+    directions.push_back({{d[0], d[1], d[2]}, {d[3], d[4], d[5]}, {d[6], d[7], d[8]}});
+  }
+  return directions;
+}
+
+void define_second_derivatives(nb::module_& m) {
+  m.def(
+      "volume_second_derivatives",
+      [](const ShapeArray& a, const ShapeArray& b, nb::handle weights_given, nb::handle along_a, nb::handle along_b,
+         bool aligned, nb::handle tolerance_given, nb::handle threads_given) {
+        const Pairing pairing = to_pairing(a, b, aligned);
+        const Doubles weights = to_weights(weights_given, a, b, aligned);
+        const std::vector<RowGradient> by_a = to_directions(along_a, "along_a", a);
+        const std::vector<RowGradient> by_b = to_directions(along_b, "along_b", b);
+        const double tolerance = to_tolerance(tolerance_given);
+        const int threads = to_threads(threads_given);
+        std::vector<double> slopes(weights.size());
+        std::vector<RowGradient> of_a(a.size()), of_b(b.size());
+        uninterrupted([&] {
+          return add_second_derivatives(a, b, pairing, std::span(weights.data(), weights.size()), by_a, by_b, tolerance,
+                                        threads, slopes, of_a, of_b);
+        });
+        const size_t count = slopes.size();
+        return nb::make_tuple(to_numpy<Vector>(std::move(slopes), {count}), gradients_of_rows(of_a),
+                              gradients_of_rows(of_b));
+      },
+      "a"_a, "b"_a, "weights"_a.none(), "along_a"_a.none(), "along_b"_a.none(), "aligned"_a, "tolerance"_a.none(),
+      "threads"_a.none(),
+      nb::sig("def volume_second_derivatives(a: ShapeArray, b: ShapeArray, weights: numpy.typing.ArrayLike, along_a: "
+              "numpy.typing.ArrayLike, along_b: numpy.typing.ArrayLike, aligned: bool, tolerance: float, threads: int "
+              "| None) -> tuple[numpy.typing.NDArray[numpy.float64], tuple[numpy.typing.NDArray[numpy.float64], ...], "
+              "tuple[numpy.typing.NDArray[numpy.float64], ...]]"),
+      R"(The second derivatives of the weighted sum of common volumes of polyhedra, times a direction, as `volume_gradients`
+arranges them. Before them, flat, the derivative of each pair's volume along the direction. A row of `along_a` (n, 9) and
+`along_b` (m, 9) has the numbers of the shape, the position and the rotation vector.)");
+}
+
 }  // namespace
 
 void define_shape_arrays(nb::module_& m) {
@@ -400,6 +444,7 @@ void define_shape_arrays(nb::module_& m) {
   define_makers(m);
   define_values(m);
   define_gradients(m);
+  define_second_derivatives(m);
 }
 
 }  // namespace overlapper::python
