@@ -41,6 +41,11 @@ MAKERS = (
     Maker("docs/view.py", ("view.png",), (*PAGE, "scenes/franka_grasp.py")),
     Maker("docs/grip.py", ("grip.png",), (*PAGE, "scenes/franka_grasp.py")),
     Maker("docs/tactile.py", ("tactile.png",), ("examples/tactile_image.py",)),
+    Maker(
+        "docs/gradients.py",
+        ("gradients.png",),
+        tuple(f"examples/{name}.py" for name in ("fit_boxes", "pack_a_bin", "gentle_grip")),
+    ),
     Maker("docs/concave.py", ("concave.png",), (*PAGE, "examples/chain_links.py")),
     Maker("docs/regression.py", ("regression.png",), (*PAGE, "examples/ci/**/*")),
     Maker("docs/meshes.py", ("meshes.png",), PAGE),

@@ -226,3 +226,15 @@ def test_the_pad_of_a_finger_feels_the_grip(run, tmp_path):
 def test_boxes_are_fitted_by_gradients(run):
     ratios = [value for (value,) in numbers(r"mean IoU ([01]\.\d+)", run("fit_boxes.py"))]
     assert ratios[0] < 0.6 and ratios[-1] > 0.999 and ratios == sorted(ratios)
+
+
+def test_boxes_fall_into_a_bin_without_overlap(run):
+    found = numbers(r"([\d.]+) cm³ wrong, mean height ([\d.]+) m", run("pack_a_bin.py"))
+    assert found[0][0] > 100 and found[-1][0] == 0 and 0.1 < found[-1][1] < 0.25
+
+
+def test_a_gripper_touches_with_a_given_volume(run):
+    found = numbers(r"left +([\d.]+) mm³, ([\d.]+) mm deep; right +([\d.]+) mm³, ([\d.]+) mm", run("gentle_grip.py"))
+    assert max(found[0][::2]) > 100 and found[-1][::2] == (20, 20) and max(found[-1][1::2]) < 1
+    off = [max(abs(volume / 20 - 1) for volume in row[::2]) for row in found]
+    assert off[-2] < 10 * off[-4] ** 2 < 0.1  # the error is squared in each step
