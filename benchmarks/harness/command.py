@@ -28,6 +28,7 @@ COMMANDS = {
     "forces": "forces.cost",
     "firsttry": "forces.firsttry",
     "boxes": "boxes.iou",
+    "million": "boxes.million",
     "motion": "motion.impacts",
     "audit": "costs.audit",
     "concave": "costs.concave",

@@ -1,11 +1,12 @@
 """The page about IoU of boxes is that of its results, and the peers agree with this package."""
 
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from boxes import iou, page
+from boxes import iou, million, page
 from overlapper import arrays
 
 ROOT = Path(__file__).parents[2]
@@ -25,8 +26,15 @@ def test_peers_agree_where_boxes_overlap_well():
     for k in range(4):
         assert iou.by_scipy(a, b, k) == pytest.approx(volumes[k], rel=1e-9)
         assert iou.by_points(rng, a, b, k) == pytest.approx(ratios[k], abs=1e-2)
-    assert iou.proved_error(a, b, volumes) < 1e-13
+    assert iou.proved_error(a, b, volumes, range(4)) < 1e-13
     row = np.array([1, 2, 3, 4, 0.5])
     assert iou.rectangle(row).area == pytest.approx(12) and iou.rectangle(row).centroid.coords[0] == pytest.approx(
         (1, 2)
     )
+
+
+def test_pairs_of_the_million_are_proved():
+    for rotation, offset in (("yaw", 0.1), ("any", 1e-8)):
+        found = million.of_class(np.random.default_rng(0), Namespace(pairs=50, proved=3), rotation, offset)
+        assert found["pairs"] == 50 and found["proved"] == 3 and found["above"] == 0
+        assert found["off"] < 1e-12 and 0 < found["stated"] <= 1e-12
