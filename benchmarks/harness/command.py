@@ -30,6 +30,7 @@ COMMANDS = {
     "boxes": "boxes.iou",
     "million": "boxes.million",
     "motion": "motion.impacts",
+    "motions": "motion.many",
     "audit": "costs.audit",
     "concave": "costs.concave",
     "recording": "costs.recording",

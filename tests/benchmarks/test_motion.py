@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from harness.command import Wrong
-from motion import impacts, page
-from overlapper import Placed, Sphere, TimeOfImpact
+from motion import impacts, many, page
+from overlapper import Placed, Sphere, TimeOfImpact, time_of_impact
 
 ROOT = Path(__file__).parents[2]
 
@@ -49,3 +49,41 @@ def test_a_wrong_time_ends_the_run():
         late.__setstate__(tuple(change.get(k, value) for k, value in enumerate(state)))
         with pytest.raises(Wrong, match=r"^balls: "):
             impacts.check(kind, motion, late)
+
+
+@pytest.mark.parametrize("kind", many.KINDS)
+def test_a_few_random_and_graded_motions_are_judged(kind, monkeypatch):
+    monkeypatch.setattr(many, "CHUNK", 20)
+    row, wrong = many.examined(kind, 900)
+    assert (row["motions"], row["late"], row["false"], wrong) == (20, 0, 0, "")
+    assert row["impact"] > 0
+    assert sum(row[status] for status in ("impact", "separated", "touching", "overlapping", "open")) == 20
+
+
+def changed(found, **change):
+    """An answer with other numbers."""
+    state = dict(enumerate(found.__getstate__()))
+    other = TimeOfImpact.__new__(TimeOfImpact)
+    other.__setstate__(
+        tuple((state | {("status", "time", "time_upper").index(k): v for k, v in change.items()}).values())
+    )
+    return other
+
+
+@pytest.mark.parametrize("kind", ["random", "grazing passes", "gaps at the end"])
+def test_late_times_and_wrong_intervals_are_noticed(kind):
+    met = 0
+    for motion in list(many.motions(kind, 901))[:40]:
+        found = time_of_impact(motion.a, motion.b, motion.of_a, motion.of_b)
+        if found.status != "impact" or found.time < 0.1:
+            continue
+        met += 1
+        assert not [*many.faults(motion, found)]
+        if kind != "grazing passes":  # else the overlap may be over
+            early = changed(found, time=found.time - 0.02, time_upper=found.time - 0.01)
+            assert "false" in many.faults(motion, early)
+        if motion.meets:
+            assert "late" in many.faults(motion, changed(found, status="separated"))
+        if kind == "random" and (late := min(found.time + 1e-5, 1.0)) < 1:
+            assert "late" in many.faults(motion, changed(found, time=late, time_upper=late + 1e-9)), (motion, found)
+    assert met > 5
