@@ -31,6 +31,8 @@ from overlapper.functions import introspectable as _introspectable
 from overlapper.shapes import Shape
 
 if TYPE_CHECKING:
+    from overlapper.motion.maximum import Maximum, maximum_depth, maximum_volume
+    from overlapper.motion.swept import SweptHull, swept_hull
     from overlapper.polytopes.database import read_polytopes as read_polytopes
     from overlapper.polytopes.database import write_polytopes as write_polytopes
     from overlapper.polytopes.mesh_file import read_hull as read_hull
@@ -50,20 +52,25 @@ __all__ = [
     "Ellipsoid",
     "HalfSpace",
     "Hull",
+    "Maximum",
     "Overlap",
     "Overlaps",
     "Placed",
     "RoundedHull",
     "Shape",
     "Sphere",
+    "SweptHull",
     "TimeOfImpact",
     "TimesOfImpact",
     "distance",
     "iou",
+    "maximum_depth",
+    "maximum_volume",
     "overlap",
     "overlaps",
     "penetration_depth",
     "random_polytope",
+    "swept_hull",
     "time_of_impact",
     "times_of_impact",
 ]
@@ -100,6 +107,8 @@ del _kind
 __getattr__ = _lazily(
     __name__,
     {
+        "motion.maximum": ("Maximum", "maximum_depth", "maximum_volume"),
+        "motion.swept": ("SweptHull", "swept_hull"),
         "polytopes.database": ("read_polytopes", "write_polytopes"),
         "polytopes.mesh_file": ("read_hull", "write_mesh"),
         "polytopes.random": ("random_polytope",),

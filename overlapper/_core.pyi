@@ -1778,3 +1778,34 @@ def swept_pairs(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | Half
     """
     The pairs of shapes whose boxes around the whole motion meet: (p, 2) indices i < j, sorted.
     """
+
+class MovingPair:
+    """Two moving bodies, in coordinates about the position of b."""
+
+    def __init__(self, a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, motion_a: tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike] | Placed | None, motion_b: tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike] | Placed | None, duration: float) -> None: ...
+
+    def at(self, time: float) -> tuple[Placed, Placed]:
+        """Both bodies at a time in s."""
+
+    def drift(self, time: float, half: float, of_a: bool) -> tuple[numpy.typing.NDArray[numpy.float64], float]:
+        """
+        (3,) m/s, a velocity of a in the frame of b within `half` seconds of a time, or of b in the frame of a.
+
+        Then a bound in m: how far the common points are beside a translation at this velocity.
+        """
+
+    def most_depth(self, start: float, normal_start: numpy.typing.ArrayLike, end: float, normal_end: numpy.typing.ArrayLike) -> float:
+        """
+        An upper bound of the depth in m between two times, from the normals of `Overlap` there.
+        """
+
+    @property
+    def lost(self) -> float:
+        """m: rounding of a depth."""
+
+def swept_supports(body: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike | trimesh.Trimesh | Placed, motion: tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike] | Placed | None, duration: float, directions: numpy.typing.ArrayLike, within: float) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    How far a moving body reaches along each of n directions, from its position at the start.
+
+    (n,) upper bounds in m, and (n, 3) points of the body at some time that are less far by `within` m at most.
+    """

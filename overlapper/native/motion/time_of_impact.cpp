@@ -14,102 +14,9 @@ namespace overlapper {
 namespace {
 
 /// More steps than any pair needs that comes closer steadily.
-constexpr int kMostAdvances = 400;
-
-/// More values of one gap than the search for its zero needs.
-constexpr int kMostValues = 48;
-
-/// Radians by which a direction turns before the next one is chosen.
-constexpr double kMostTurned = 2;
-
-/// Room for the rounding of factors that only have to be large enough.
-constexpr double kEnough = 1 + 0x1p-40;
+constexpr int kMostPoses = 400;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-
-/// The rotation of a quaternion. Every entry is right to some units of the last place of 1.
-Mat3 quick_rotation(Quaternion q) {
-  const double s = 2 / (q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
-  const Vec3 v{q.x, q.y, q.z}, u = s * v;
-  const Vec3 x = u.x * v, y = u.y * v, w = q.w * u;
-  const double zz = u.z * v.z;
-  return {{1 - y.y - zz, x.y - w.z, x.z + w.y},
-          {x.y + w.z, 1 - x.x - zz, y.z - w.x},
-          {x.z - w.y, y.z + w.x, 1 - x.x - y.y}};
-}
-
-/// A direction that turns about a unit axis.
-Vec3 turned(Vec3 direction, Vec3 axis, double angle) {
-  if (angle == 0) return direction;
-  const double sine = std::sin(angle), half = std::sin(angle / 2);
-  const Vec3 across = cross(axis, direction);
-  return direction + sine * across + (2 * half * half) * cross(axis, across);
-}
-
-/// One body during the motion, in coordinates about the position of b.
-struct Mover {
-  Placed body;
-  Quaternion start;
-  Vec3 spin, axis;
-  double speed;       ///< rad/s
-  double radius;      ///< of the core
-  double reach;       ///< m: bound of the distance of the core's points from the position
-  double reach_axis;  ///< m: the same from the axis of the spin through the position
-  bool far_origin;    ///< its pose needs wider arithmetic
-
-  Mover(const Placed& placed, Vec3 angular)
-      : body(make_placed(placed.shape, {}, {})),
-        start(in_range(placed.orientation)),
-        spin(angular),
-        axis(unit(angular)),
-        speed(norm(angular)),
-        radius(core_radius(placed.shape)) {
-    const HullData* hull = polytope_of(placed.shape);
-    far_origin = hull && !(hull->origin == Vec3{});
-    const Plane* plane = only_plane(placed.shape);
-    reach = reach_axis = plane ? std::abs(plane->offset) : 0;
-    Vec3 corner;
-    if (!plane) {
-      const auto most = [&](Vec3 along) {
-        return std::max(dot(along, body.core_support(along)), -dot(along, body.core_support(-along)));
-      };
-      corner = kEnough * Vec3{most({1, 0, 0}), most({0, 1, 0}), most({0, 0, 1})};
-      reach = reach_axis = norm(corner) * kEnough;
-    }
-    body.move_to({}, start);
-    if (plane || !(speed > 0)) return;
-    const Vec3 own = apply_transposed(body.pose.rotation, axis);
-    reach_axis = 0;
-    for (double y : {-1.0, 1.0})
-      for (double z : {-1.0, 1.0}) reach_axis = std::max(reach_axis, norm(cross(own, scaled(corner, {1, y, z}))));
-    reach_axis = std::min(reach, reach_axis * kEnough + 0x1p-48 * reach);
-  }
-
-  void move_to(Vec3 position, double time) {
-    if (speed == 0 && !far_origin) {
-      body.position = body.pose.translation = position;
-      return;
-    }
-    const double half = speed * time / 2, sine = std::sin(half), w = std::cos(half);
-    const Vec3 v = sine * axis, u{start.x, start.y, start.z}, product = w * u + start.w * v + cross(v, u);
-    const Quaternion q{product.x, product.y, product.z, w * start.w - dot(v, u)};
-    if (far_origin) return body.move_to(position, q);
-    body.position = body.pose.translation = position;
-    body.orientation = q;
-    body.pose.rotation = quick_rotation(q);
-  }
-
-  Vec3 local_support(Vec3 direction) const {
-    return apply_transposed(body.pose.rotation, body.core_support(direction) - body.pose.translation);
-  }
-
-  /// The greatest dot product of a direction with a point of the core, relative to the position. A half-space has one
-  /// in the direction of its normal only.
-  double farthest(Vec3 direction) const {
-    if (const Plane* plane = only_plane(body.shape)) return plane->offset;
-    return dot(direction, body.core_support(direction) - body.position);
-  }
-};
 
 /// The directions of the flat in which a body touches its supporting plane across the normal.
 struct Flat {
@@ -128,130 +35,10 @@ struct Flat {
   }
 };
 
-/// The motion of two bodies, with poses at any time.
-struct Pair {
-  Mover a, b;
-  Vec3 between, velocity;  ///< of a relative to b
-  double lost = 0;         ///< m: rounding of a gap
-
-  Vec3 apart(double time) const { return between + time * velocity; }
-  void move_to(double time) {
-    b.move_to({}, time);
-    a.move_to(apart(time), time);
-  }
-};
-
-/// The gap between two bodies along a direction that turns at a constant rate, by the time from `start` on, or from
-/// `earlier` seconds before it. The bodies are separated while this gap is positive.
-///
-/// Each pair of points of the cores has a distance along the direction, and the gap is the least of them. The second
-/// derivative of each of these distances is at most `curvature`, the first derivative at most `steepest`. Between two
-/// times, the gap is therefore at least the chord less curvature / 2 times both parts of the interval.
-class Gap {
- public:
-  Gap(Pair& pair, double start, double earlier, double rest, Vec3 normal, Vec3 turning)
-      : pair_(pair), start_(start), normal_(normal), axis_(unit(turning)), rate_(norm(turning)) {
-    const Mover &a = pair.a, &b = pair.b;
-    const double normal_rate = norm(cross(turning, normal)), speed = norm(pair.velocity);
-    limit_ = normal_rate * rest > kMostTurned ? kMostTurned / normal_rate : rest;
-    const double apart = std::max(norm(pair.apart(start)), norm(pair.apart(start + limit_))) + speed * earlier;
-    curvature_ = normal_rate * (2 * speed + rate_ * apart);
-    steepest_ = normal_rate * apart + (normal_rate > 0 ? speed : std::abs(dot(normal, pair.velocity)));
-    for (const Mover* each : {&a, &b}) {
-      const Vec3 relative = each->spin - turning;
-      const double beside = norm(normal_rate > 0 ? relative : cross(relative, normal));
-      curvature_ += norm(relative) * normal_rate * each->reach + beside * each->speed * each->reach_axis;
-      steepest_ += beside * each->reach;
-    }
-    curvature_ *= kEnough, steepest_ *= kEnough;
-  }
-
-  Vec3 direction(double after) const { return turned(normal_, axis_, rate_ * after); }
-
-  /// The gap less the rounding, for bodies at that time.
-  double value_here(double after) const {
-    const Vec3 n = direction(after);
-    return dot(n, pair_.apart(start_ + after)) - pair_.a.farthest(-n) - pair_.b.farthest(n) - pair_.a.radius -
-           pair_.b.radius - pair_.lost;
-  }
-
-  /// The same, and the bodies are moved to that time.
-  double value(double after) {
-    pair_.move_to(start_ + after);
-    const double level = value_here(after);
-    if (level < least_) least_ = level, least_after_ = after;
-    return level;
-  }
-
-  /// True if the gap is positive during an interval of this length between two times with these gaps.
-  bool open(double first, double last, double length) const {
-    if (!(first > 0 && last > 0)) return false;
-    return std::abs(first - last) >= curvature_ * length * length / 2 ||
-           std::sqrt(first) + std::sqrt(last) >= length * std::sqrt(curvature_ / 2) * kEnough ||
-           first + last >= steepest_ * length;
-  }
-
-  double limit() const { return limit_; }
-
-  /// A time up to which the gap is open, near to its zero if there is one before `limit`. `now` is the gap at once.
-  double open_until(double now, double width) {
-    double low = 0, at_low = now, high = limit_, longest = kNever;
-    // The Illinois method: the value at one end is halved if the other end has moved twice.
-    double left = now, right = kNever;
-    int moved = 0;  // -1: low, 1: high
-    for (int k = 0; k < kMostValues; ++k) {
-      double h = high;
-      if (right < kNever) {
-        if (high - low <= width / 4) break;
-        h = low + (high - low) * std::clamp(left / (left + right), 0.001, 0.999);
-        // Beyond the zero by a little, on the side that has not moved.
-        h += moved > 0 ? -width / 16 : width / 16;
-        if (!(h > low && h < high)) h = low + (high - low) / 2;
-      }
-      // The gap can hardly be open for more than twice the time that a gap of this size stays open.
-      h = std::min({h, low + longest, low + 2 * std::max(std::sqrt(2 * at_low / curvature_), at_low / steepest_)});
-      const double at = value(h);
-      if (!(at > 0)) {
-        if (moved > 0) left /= 2;
-        moved = 1, high = h, right = -at, longest = kNever;
-      } else if (open(at_low, at, h - low)) {
-        if (h == limit_) return limit_;
-        if (moved < 0 && right < kNever) right /= 2;
-        moved = -1, low = h, at_low = left = at, longest = kNever;
-      } else {
-        longest = (h - low) / 2;
-      }
-    }
-    return std::min(limit_, low + at_low / steepest_);
-  }
-
-  double least() const { return least_; }
-  double least_time() const { return start_ + least_after_; }
-
- private:
-  Pair& pair_;
-  double start_;
-  Vec3 normal_, axis_;
-  double rate_, limit_ = 0, curvature_ = 0, steepest_ = 0;
-  double least_ = kNever, least_after_ = 0;
-};
-
 class Motion {
  public:
   Motion(const Placed& a, const Placed& b, const Velocity& of_a, const Velocity& of_b, double duration, double width)
-      : pair_{{a, of_a.angular}, {b, of_b.angular}, a.position - b.position, of_a.linear - of_b.linear},
-        from_(b.position),
-        drift_(of_b.linear),
-        duration_(duration),
-        width_(width) {
-    const double start = norm(pair_.between), way = duration * norm(pair_.velocity);
-    // In units of half an ulp: 8 roundings of the relative position and 64 of dot products with it, and 64 of the
-    // turned direction. A quaternion loses 4 |angle| + 32, its rotation 32, and the direction 64.
-    pair_.lost = 136 * (start + way);
-    for (const Mover* each : {&pair_.a, &pair_.b})
-      pair_.lost += (each->reach + each->radius) * (192 + 4 * each->speed * duration);
-    pair_.lost *= 0x1p-53;
-  }
+      : pair_(a, b, of_a, of_b, duration), from_(b.position), drift_(of_b.linear), duration_(duration), width_(width) {}
 
   Impact find() {
     impact_.distance = kNever;
@@ -262,7 +49,7 @@ class Motion {
       return done(Meeting::kSeparated, duration_, duration_);
     }
     Distance nearest = place(t);
-    while (impact_.steps < kMostAdvances) {
+    while (impact_.steps < kMostPoses) {
       if (!separated(nearest, t)) {
         if (met_after(t, nearest)) return impact_;
         continue;
@@ -311,9 +98,9 @@ class Motion {
   double before_spheres() const {
     const Mover &a = pair_.a, &b = pair_.b;
     if (!bounded(a.body.shape) || !bounded(b.body.shape)) return 0;
-    const double far = (a.reach + a.radius + b.reach + b.radius) * kEnough + pair_.lost;
+    const double far = (a.reach + a.radius + b.reach + b.radius) * kRoundedUp + pair_.lost;
     const double speed2 = norm2(pair_.velocity), closing = -dot(pair_.between, pair_.velocity);
-    const auto outside = [&](double t) { return norm(pair_.apart(t)) > far * kEnough; };
+    const auto outside = [&](double t) { return norm(pair_.apart(t)) > far * kRoundedUp; };
     if (!outside(0)) return 0;
     if (!(closing > 0)) return duration_;
     const double nearest = closing / speed2;
@@ -441,7 +228,7 @@ class Motion {
     return true;
   }
 
-  Pair pair_;
+  MovingPair pair_;
   Vec3 from_, drift_;
   double duration_, width_;
   double least_ = kNever, least_time_ = 0;

@@ -1,14 +1,8 @@
 #pragma once
 
-#include "shapes/shape.h"
+#include "motion/moving_pair.h"
 
 namespace overlapper {
-
-/// The position moves along a line. The body turns about its position. Both velocities are constant in the world.
-struct Velocity {
-  Vec3 linear;   ///< m/s
-  Vec3 angular;  ///< rad/s
-};
 
 enum class Meeting {
   kSeparated,    ///< no common point at any time of the motion

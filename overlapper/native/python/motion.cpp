@@ -5,6 +5,7 @@
 
 #include "batch/motions.h"
 #include "geometry/cancellation.h"
+#include "motion/swept_support.h"
 #include "python/arrays.h"
 #include "python/batch.h"
 #include "python/frames.h"
@@ -84,6 +85,32 @@ double to_duration(nb::handle given) {
   const double duration = to_double(given, "duration");
   if (!(duration > 0 && duration < 1e25)) fail("duration", "must be greater than 0 and less than 1e25 s");
   return duration;
+}
+
+void make_pair_of(MovingPair* self, nb::handle a_given, nb::handle b_given, nb::handle motion_a, nb::handle motion_b,
+                  nb::handle duration_given) {
+  const Placed a = to_placed(a_given, "a"), b = to_placed(b_given, "b");
+  const double duration = to_duration(duration_given);
+  const Velocity of_a = to_velocity(motion_a, a, duration, "motion_a"),
+                 of_b = to_velocity(motion_b, b, duration, "motion_b");
+  new (self) MovingPair(a, b, of_a, of_b, duration);
+}
+
+nb::tuple swept_supports(nb::handle body_given, nb::handle motion, nb::handle duration_given, nb::handle directions,
+                         double within) {
+  const Placed body = to_placed(body_given, "body");
+  if (!bounded(body.shape)) fail("body", "must not be a half-space");
+  const double duration = to_duration(duration_given);
+  const Velocity velocity = to_velocity(motion, body, duration, "motion");
+  const std::vector<Vec3> along = to_rows(directions, "directions");
+  std::vector<double> upper;
+  std::vector<Vec3> points;
+  Mover mover(body, velocity.angular);
+  for (Vec3 each : along) {
+    const SweptSupport found = swept_support(mover, velocity.linear, duration, unit(each), within);
+    upper.push_back(found.upper), points.push_back(found.point);
+  }
+  return nb::make_tuple(to_numpy<Vector>(std::move(upper), {along.size()}), to_numpy(std::span<const Vec3>(points)));
 }
 
 TimeOfImpact find(nb::handle a_given, nb::handle b_given, nb::handle motion_a, nb::handle motion_b,
@@ -435,6 +462,53 @@ Examples
 >>> hit.status, round(hit.time, 9)
 ('impact', 0.003298333))");
   define_times_of_impact(m);
+  nb::class_<MovingPair> pair(m, "MovingPair", R"(Two moving bodies, in coordinates about the position of b.)");
+  pair.def("__init__", &make_pair_of, "a"_a.none(), "b"_a.none(), "motion_a"_a.none(), "motion_b"_a.none(),
+           "duration"_a.none(),
+           nb::sig(("def __init__(self, a: " + any_solid() + " | Placed, b: " + any_solid() +
+                    " | Placed, motion_a: tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike] | Placed | None, "
+                    "motion_b: tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike] | Placed | None, duration: float) "
+                    "-> None")
+                       .c_str()));
+  pair.def(
+      "at",
+      [](MovingPair& self, double time) {
+        self.move_to(time);
+        return nb::make_tuple(self.a.body, self.b.body);
+      },
+      "time"_a, nb::sig("def at(self, time: float) -> tuple[Placed, Placed]"), "Both bodies at a time in s.");
+  pair.def(
+      "drift",
+      [](const MovingPair& self, double time, double half, bool of_a) {
+        const Drift found = of_a ? self.drift_of_a(time, half) : self.drift_of_b(time, half);
+        return nb::make_tuple(to_numpy(found.velocity), found.beside);
+      },
+      "time"_a, "half"_a, "of_a"_a,
+      nb::sig("def drift(self, time: float, half: float, of_a: bool) -> tuple[numpy.typing.NDArray[numpy.float64], "
+              "float]"),
+      R"((3,) m/s, a velocity of a in the frame of b within `half` seconds of a time, or of b in the frame of a.
+
+Then a bound in m: how far the common points are beside a translation at this velocity.)");
+  pair.def(
+      "most_depth",
+      [](MovingPair& self, double start, nb::handle normal_start, double end, nb::handle normal_end) {
+        return self.most_depth(start, to_vec3(normal_start, "normal_start"), end, to_vec3(normal_end, "normal_end"));
+      },
+      "start"_a, "normal_start"_a, "end"_a, "normal_end"_a,
+      nb::sig("def most_depth(self, start: float, normal_start: numpy.typing.ArrayLike, end: float, normal_end: "
+              "numpy.typing.ArrayLike) -> float"),
+      "An upper bound of the depth in m between two times, from the normals of `Overlap` there.");
+  pair.def_prop_ro("lost", [](const MovingPair& self) { return self.lost; }, "m: rounding of a depth.");
+  m.def("swept_supports", &swept_supports, "body"_a.none(), "motion"_a.none(), "duration"_a.none(),
+        "directions"_a.none(), "within"_a,
+        nb::sig(("def swept_supports(body: " + any_solid() +
+                 " | Placed, motion: tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike] | Placed | None, duration: "
+                 "float, directions: numpy.typing.ArrayLike, within: float) -> "
+                 "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]")
+                    .c_str()),
+        R"(How far a moving body reaches along each of n directions, from its position at the start.
+
+(n,) upper bounds in m, and (n, 3) points of the body at some time that are less far by `within` m at most.)");
 }
 
 }  // namespace overlapper::python
