@@ -48,6 +48,8 @@ def run(
         volumetric = stack.enter_context(_volumetric(scene, bodies)) if model == "volumetric" else None
         for i in range(steps or scene.steps):
             _controlled(scene, step, i)
+            if between:
+                bodies.step_begins()
             if volumetric is not None:
                 volumetric.step()
             else:

@@ -91,7 +91,7 @@ class Watch:
         Compare every pair with FCL, or with the answer of MuJoCo itself, if MuJoCo runs the simulation.
     between : bool, default False
         Find pairs that passed through each other between two steps, as `Bodies.first_overlaps` does. It needs every
-        step. A reset of a pose between two steps counts as a motion.
+        step. Bodies that something but a step has moved, such as a reset, have not passed through others.
     recorder : Recorder, optional
         A recorder that was set up earlier.
     names : dict of int to str, optional
@@ -185,6 +185,8 @@ class Watch:
             return
         if happening == "stepped":
             self._stepped()
+        elif happening == "step begins":
+            self._step_begins()
         elif happening == "real time begins" and not self._sampler:
             self._enough.clear()
             self._sampler = threading.Thread(target=self._sample, daemon=True)
@@ -220,6 +222,22 @@ class Watch:
             self._sampler.join()
             self._sampler = None
 
+    def _step_begins(self) -> None:
+        if self._between and self._bodies is not None:
+            with self._left_after_errors():
+                self._bodies.step_begins()
+
+    @contextmanager
+    def _left_after_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except KeyboardInterrupt:
+            self._bodies = None  # it may have been interrupted in any state
+            raise
+        except Exception:
+            self.leave()
+            raise
+
     def _stepped(self) -> None:
         seconds = self._simulation.time_step
         if seconds != self._rhythm[2]:
@@ -228,14 +246,8 @@ class Watch:
         self.time = self._rhythm[1] + (self.steps - self._rhythm[0]) * seconds
         if self.steps % self.every:
             return
-        try:
+        with self._left_after_errors():
             self._measure()
-        except KeyboardInterrupt:
-            self._bodies = None  # it may have been interrupted in any state
-            raise
-        except Exception:
-            self.leave()
-            raise
 
     def _measure(self) -> None:
         if self._bodies is None:
@@ -446,6 +458,12 @@ class _Kept(Watch):
     def _stepped(self) -> None:
         try:
             super()._stepped()
+        except Exception as error:
+            self._failed.append((self, error))
+
+    def _step_begins(self) -> None:
+        try:
+            super()._step_begins()
         except Exception as error:
             self._failed.append((self, error))
 

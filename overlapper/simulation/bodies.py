@@ -52,8 +52,12 @@ class AnyBodies(Generic[Kind]):
         self._last: tuple[Contacts[Kind], Layout, partial[Mask]] | None = None
         self._arrange()
         self._refresh(stacklevel=4)
-        self._before: Moment | None = None  # the update before the last one
+        self._source.step_ended()
         self._now = Moment.of(self._layout, self._grounds.links)
+        self._motion: tuple[Moment, Moment] | None = None  # between the last two updates
+        # The beginning or the end of the next motion, if something but a step has moved bodies.
+        self._begun: Moment | None = None
+        self._ended: Moment | None = None
         # Pairs of shapes that overlap or touch at these two moments, as far as the last overlaps() there has found.
         self._met_before, self._met_now = _NO_PAIRS, _NO_PAIRS
 
@@ -63,8 +67,24 @@ class AnyBodies(Generic[Kind]):
         A base that has not moved since the last update is asked whether it has become static (mass 0).
         """
         self._refresh(stacklevel=3)
-        self._before, self._now = self._now, Moment.of(self._layout, self._grounds.links)
-        self._met_before, self._met_now = self._met_now, _NO_PAIRS
+        self._source.step_ended()
+        now = Moment.of(self._layout, self._grounds.links)
+        self._motion = self._begun or self._now, self._ended or now
+        self._met_before = _NO_PAIRS if self._begun else self._met_now
+        self._now, self._met_now, self._begun, self._ended = now, _NO_PAIRS, None, None
+
+    def step_begins(self) -> None:
+        """Leave out of `first_overlaps()` what was moved since the last update, as by a reset. Call it before a step.
+
+        Without this call, everything between two updates is a motion.
+        """
+        if self._source.poses_lag:
+            ended = self._source.end_of_step(self._now.layout)
+            self._ended = replace(self._now, positions=ended[0], orientations=ended[1]) if ended else None
+            return
+        self._refresh(stacklevel=3)
+        moment = Moment.of(self._layout, self._grounds.links)
+        self._begun = None if moment.same_as(self._now) else moment
 
     def follow(self) -> None:
         """Read all poses of the bodies known at the last `update()`. Bodies that come or go are not noticed."""
@@ -133,8 +153,8 @@ class AnyBodies(Generic[Kind]):
         This is continuous collision detection: it finds a bullet that is in front of a sheet at one update and behind
         the sheet at the next. Between the two poses, the position of each shape moves along a line at a constant
         velocity, and the shape turns at a constant rate the shorter way. Call `update()` once per step: the motion of
-        several steps is not along lines. A reset of a pose between two updates counts as a motion, so call `update()`
-        after the reset, too.
+        several steps is not along lines. A reset of a pose between two updates counts as a motion, unless
+        `step_begins()` is called between the reset and the step.
 
         Pairs that overlap or touch at the first of the two poses are left out, as `overlaps()` there has them. Bodies
         that came between the two updates are left out, too. Prisms of height fields are those near shapes at the end.
@@ -159,10 +179,10 @@ class AnyBodies(Generic[Kind]):
         ValueError
             If `update()` was not called yet, or `pairs` names a body or a link that is not in the simulation.
         """
-        if self._before is None:
+        if self._motion is None:
             raise ValueError("first_overlaps() needs the poses of two updates: call update() after a step first")
         asked: Numbered = pairs if isinstance(pairs, str) else self._asked_for(pairs)
-        before, now = self._before, self._now
+        before, now = self._motion
         layout = now.layout
         start, turned, known = now.begun(before)
         end = now.positions, now.orientations

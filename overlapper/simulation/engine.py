@@ -22,7 +22,9 @@ RETURNED = frozenset({"mujoco"})
 FILES = {".xml": "mujoco"}
 """The engine that simulates a model file directly, by the ending of the file."""
 
-Happening = Literal["began", "stepped", "ended", "real time begins", "real time ends", "has no real time"]
+Happening = Literal[
+    "began", "step begins", "stepped", "ended", "real time begins", "real time ends", "has no real time"
+]
 Listener = Callable[[Happening, Hashable], None]
 """Called with an event of a simulation, and with the simulation."""
 

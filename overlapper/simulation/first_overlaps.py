@@ -114,6 +114,11 @@ class Moment:
         """The present poses."""
         return cls(layout, layout.positions, layout.orientations, {key: layout.frame(key) for key in grounds})
 
+    def same_as(self, other: Moment) -> bool:
+        """Whether it has the same shapes at the same poses."""
+        pairs = (self.positions, other.positions), (self.orientations, other.orientations)
+        return self.layout is other.layout and all(np.array_equal(a, b) for a, b in pairs)
+
     def begun(self, earlier: Moment) -> tuple[Array, Array, Mask]:
         """The poses of these shapes at an earlier moment, and for each shape whether its pose was known then.
 

@@ -85,6 +85,11 @@ class Layout:
         """(n,) how far the shapes in these rows extend from their own origins, m; infinite for planes."""
         return np.array([_reach(self.shapes[row]) for row in rows])
 
+    def placed(self, frames: Frames) -> tuple[Array, Array]:
+        """The positions and orientations of the shapes if their colliders have these frames."""
+        positions, orientations, _ = self._fixed.world(frames, FARTHEST)
+        return positions, orientations
+
     def pose(self) -> set[int]:
         """Place the shapes by the present poses of their colliders. Returns the bodies with an unusable pose."""
         self._read = self.poses.read()

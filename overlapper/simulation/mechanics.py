@@ -111,5 +111,8 @@ class Mechanics(Protocol):
     def stepped(self, duration: float) -> None:
         """End a time step of `duration` (s), complete or given up."""
 
+    def announce_begin(self) -> None:
+        """Report to all listeners that a step begins."""
+
     def announce(self) -> None:
         """Report a step to all listeners."""

@@ -12,7 +12,7 @@ from overlapper.simulation.collision_rules import Mask, Rules
 from overlapper.simulation.contacts import Contact, Contacts
 from overlapper.simulation.layout import Layout, Poses
 from overlapper.simulation.mechanics import Mechanics
-from overlapper.simulation.model import ModelledBody, Skipped
+from overlapper.simulation.model import Array, ModelledBody, Skipped
 
 
 class Unreadable(RuntimeError):
@@ -27,6 +27,9 @@ class Source(Protocol):
 
     contact: type[Contact] = Contact
     """The class of contacts: two shapes that overlap or touch."""
+
+    poses_lag: bool = False
+    """Whether the poses that are read after a step are those of its beginning."""
 
     bodies: dict[int, ModelledBody]
     """The bodies by number, sorted. `AnyBodies` replaces a height field when it models another part of the ground."""
@@ -43,6 +46,18 @@ class Source(Protocol):
 
     def poses(self, links: Mapping[int, Sequence[int]]) -> Poses:
         """The reader of the frames of these bodies' bases, and of their `links`."""
+
+    def step_ended(self) -> None:
+        """Called at first and after each step, before anything but the step can have moved a body."""
+        return
+
+    def end_of_step(self, layout: Layout) -> tuple[Array, Array] | None:
+        """Called before each step, for a simulator whose poses after a step are those of its beginning.
+
+        The positions and orientations of the shapes at the end of the last step, if something but this step has moved a
+        body since.
+        """
+        return None
 
     def rules(self, layout: Layout) -> Rules:
         """The rules in force. The object stays the same as long as the rules and the layout do."""

@@ -214,3 +214,98 @@ def test_tables_and_pickles_of_first_overlaps(client):
     again = pickle.loads(pickle.dumps(found[0]))
     assert again == found[0] and isinstance(again, FirstOverlap) and np.array_equal(again.point, found[0].point)
     assert FirstOverlaps().to_pandas().empty and "FirstOverlaps, 1" in found._repr_html_()
+
+
+def test_a_reset_before_a_step_is_no_motion(client):
+    scene = Bullet(client, height=0.5, speed=0)
+    bodies = scene.bodies()
+    scene.put(-0.5)  # through the sheet, but not by a step
+    bodies.step_begins()
+    scene.step()
+    bodies.update()
+    assert bodies.first_overlaps() == []
+    scene.put(0.5)
+    scene.p.resetBaseVelocity(scene.ball, [0, 0, -SPEED], physicsClientId=client)
+    bodies.step_begins()
+    scene.step()  # 0.42 m with at most 100 m/s: it does not reach the sheet
+    bodies.update()
+    assert bodies.first_overlaps() == []
+    bodies.step_begins()
+    scene.step()
+    bodies.update()
+    assert len(bodies.first_overlaps().tunnelled) == 1
+    scene.put(0.5)
+    bodies.update()  # without step_begins(), everything is a motion
+    assert len(bodies.first_overlaps().tunnelled) == 1
+
+
+def test_bodies_that_come_before_a_step_take_part_in_its_motion(client):
+    scene = Bullet(client, height=5, speed=0)
+    bodies = scene.bodies()
+    ball = scene.new_ball(0.2, SPEED)
+    bodies.step_begins()
+    scene.step()
+    bodies.update()
+    assert [found.bodyB for found in bodies.first_overlaps().tunnelled] == [ball]
+
+
+class Resets:
+    """A bullet that is put back in front of a sheet again and again, with the reset that is given."""
+
+    def __init__(self, reset):
+        mujoco = pytest.importorskip("mujoco")
+        self.mujoco, self.reset = mujoco, reset
+        self.model = mujoco.MjModel.from_xml_string(MODEL)
+        self.data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, self.data)
+
+    def run(self, heights, speed, steps=2):
+        """Each round: the ball is put at a height with a speed, then some steps of 0.004 s are made."""
+        from overlapper.mujoco import Bodies
+
+        bodies, met = Bodies(self.model, self.data), []
+        for height in heights:
+            self.reset(self, height, speed)
+            for _ in range(steps):
+                bodies.step_begins()
+                self.mujoco.mj_step(self.model, self.data)
+                bodies.update()
+                met.append(len(bodies.first_overlaps().tunnelled))
+        return met
+
+
+def put_back(scene, height, speed):
+    scene.data.qpos[2], scene.data.qvel[2] = height, -speed
+
+
+def reset_data(scene, height, speed):
+    scene.mujoco.mj_resetData(scene.model, scene.data)
+    put_back(scene, height, speed)
+    scene.mujoco.mj_forward(scene.model, scene.data)
+
+
+@pytest.mark.parametrize("reset", [put_back, reset_data])
+def test_resets_of_mujoco_are_no_motions(reset):
+    scene = Resets(reset)
+    assert scene.run([0.5, -0.5, 0.5, -0.5], 0.0) == [0] * 8
+    # The poses after a step of MuJoCo are those of its beginning, so a motion is found one step later.
+    assert scene.run([0.5, -0.5, 0.5], 150.0) == [0, 1, 0, 0, 0, 1]
+    assert scene.run([0.5, 0.5, -0.5], 150.0, steps=1) == [0, 1, 1]  # the last step before a reset is a motion
+
+
+def test_a_mocap_body_that_is_moved_between_steps_moves():
+    mujoco = pytest.importorskip("mujoco")
+    from overlapper.mujoco import Bodies
+
+    text = MODEL.replace('<geom name="sheet"', '<body name="holder" mocap="true"><geom name="sheet"')
+    model = mujoco.MjModel.from_xml_string(text.replace('.0005"/>', '.0005"/></body>'))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    bodies, met = Bodies(model, data), []
+    for height in (0.5, 1.5, 1.5):  # the ball is at 1
+        data.mocap_pos[0, 2] = height
+        bodies.step_begins()
+        mujoco.mj_step(model, data)
+        bodies.update()
+        met.append(len(bodies.first_overlaps().tunnelled))
+    assert met == [0, 1, 0]

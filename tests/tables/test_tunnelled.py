@@ -152,3 +152,63 @@ def test_a_summary_counts_what_is_undecided(scene):
             summary.add(frame)
     assert (summary.undecided, summary.tunnelled) == (2, [])
     assert summary.as_dict()["undecided"] == 2
+
+
+@pytest.mark.parametrize("reset", ["pose", "simulation", "state"])
+def test_a_watch_sees_no_motion_in_a_reset(client, reset):
+    def build():
+        sheet = body(client, p.GEOM_BOX, halfExtents=[1, 1, 0.0005], mass=0)
+        ball = body(client, p.GEOM_SPHERE, radius=0.01, mass=1, position=[0, 0, 0.5])
+        return sheet, ball
+
+    _, ball = build()
+    state = p.saveState(physicsClientId=client)
+    watch = overlapper.watch(client, between=True)
+    p.stepSimulation(client)
+    p.resetBaseVelocity(ball, [0, 0, -84], physicsClientId=client)
+    for _ in range(2):
+        p.stepSimulation(client)
+    assert len(watch.summary.tunnelled) == 1  # and now it is below the sheet
+    if reset == "pose":
+        p.resetBasePositionAndOrientation(ball, [0, 0, 0.5], [0, 0, 0, 1], physicsClientId=client)
+    elif reset == "simulation":
+        p.resetSimulation(physicsClientId=client)
+        build()
+    else:
+        p.restoreState(state, physicsClientId=client)
+    p.stepSimulation(client)
+    watch.close()
+    assert len(watch.summary.tunnelled) == 1 and watch.measured == 4
+
+
+def test_a_watch_of_mujoco_sees_no_motion_in_a_reset():
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option gravity="0 0 0"/><worldbody><geom type="box" size="1 1 .0005"/><body pos="0 0 .5"><freejoint/>'
+        '<geom type="sphere" size=".01"/></body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    with overlapper.watch(data, between=True) as watch:
+        mujoco.mj_step(model, data)
+        data.qvel[2] = -300
+        for _ in range(3):  # 0.6 m in a step
+            mujoco.mj_step(model, data)
+        assert len(watch.summary.tunnelled) == 1
+        mujoco.mj_resetData(model, data)
+        for _ in range(2):
+            mujoco.mj_step(model, data)
+        assert len(watch.summary.tunnelled) == 1 and watch.measured == 6
+
+
+def test_a_scene_that_puts_a_body_elsewhere_has_no_tunnelled_row(scene):
+    scene.write_text(
+        SCENE
+        + """
+    def put(i):
+        p.resetBasePositionAndOrientation(bullet, [0, 0, 0.5 - i % 2], [0, 0, 0, 1], physicsClientId=client)
+        p.resetBaseVelocity(bullet, [0, 0, 0], physicsClientId=client)
+    return put
+"""
+    )
+    with closing(run(load_scene(scene), between=True)) as frames:
+        assert [frame.first for frame in frames] == [[]] * 4

@@ -82,7 +82,9 @@ CALLS: dict[str, tuple[str, ...]] = {
 
 Arguments = dict[str, Any]
 Listener = Callable[[str, Arguments, Any], None]
-"""Called after a call, with its name, its arguments by name and its result."""
+"""Called after a call, with its name, its arguments by name and its result; and before a step, as BEGINS."""
+
+BEGINS = "stepSimulation begins"
 
 _ORIGINALS: dict[str, Callable[..., Any]] = {}
 _listeners: list[Listener] = []
@@ -138,7 +140,7 @@ def unheard(name: str) -> Callable[..., Any]:
 
 
 def tell(name: str, arguments: Arguments) -> None:
-    """Report to the listeners one call that was made by one or more unheard calls."""
+    """Report to the listeners one call that was made by one or more unheard calls, or that a step begins."""
     with busy:
         for listener in tuple(_listeners):
             listener(name, arguments, None)
@@ -163,6 +165,8 @@ class _Heard:
             if step and pybullet.isConnected(*args, **kwargs):  # it refuses the arguments that stepSimulation refuses
                 step()
                 return ()  # as stepSimulation
+            if self._name == "stepSimulation":
+                tell(BEGINS, arguments)
             result = _ORIGINALS[self._name](*args, **kwargs)
             for listener in tuple(_listeners):
                 listener(self._name, arguments, result)

@@ -17,7 +17,7 @@ from overlapper.simulation.source import Unreadable
 
 import pybullet  # isort: skip  # after the simulation, which says what to install
 
-HAPPENINGS: dict[str, Happening] = {"stepSimulation": "stepped", "disconnect": "ended"}
+HAPPENINGS: dict[str, Happening] = {calls.BEGINS: "step begins", "stepSimulation": "stepped", "disconnect": "ended"}
 
 
 class Client:

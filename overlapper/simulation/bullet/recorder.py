@@ -13,7 +13,7 @@ import pybullet_data
 from numpy.typing import ArrayLike
 
 from overlapper.printable import printable
-from overlapper.simulation.bullet.calls import Arguments, listen, unlisten
+from overlapper.simulation.bullet.calls import BEGINS, Arguments, listen, unlisten
 from overlapper.simulation.bullet.commands import Commands
 from overlapper.simulation.height_field import HeightField
 from overlapper.simulation.model import LinkKey
@@ -22,7 +22,13 @@ from overlapper.simulation.model import LinkKey
 UNNOTED = frozenset(
     {
         *("connect", "stepSimulation", "setRealTimeSimulation", "changeConstraint", "applyExternalForce"),
-        *("applyExternalTorque", "setJointMotorControl2", "setJointMotorControlArray", "setJointMotorControlMultiDof"),
+        *(
+            "applyExternalTorque",
+            BEGINS,
+            "setJointMotorControl2",
+            "setJointMotorControlArray",
+            "setJointMotorControlMultiDof",
+        ),
         *("setJointMotorControlMultiDofArray", "restoreState", "setAdditionalSearchPath"),
     }
 )

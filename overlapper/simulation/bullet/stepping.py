@@ -7,7 +7,7 @@ from weakref import WeakValueDictionary
 
 import pybullet
 
-from overlapper.simulation.bullet.calls import listen, replace_steps, tell, unheard, unlisten
+from overlapper.simulation.bullet.calls import BEGINS, listen, replace_steps, tell, unheard, unlisten
 from overlapper.simulation.bullet.commands import Commands
 from overlapper.simulation.bullet.dynamics import BulletDynamics
 from overlapper.simulation.bullet.memory import Memory
@@ -85,6 +85,9 @@ class Stepping:
     def stepped(self, duration: float) -> None:
         pybullet.setTimeStep(duration, self._client)
         self._commands.stepped()
+
+    def announce_begin(self) -> None:
+        tell(BEGINS, {"physicsClientId": self._client})
 
     def announce(self) -> None:
         tell("stepSimulation", {"physicsClientId": self._client})

@@ -183,6 +183,7 @@ class VolumetricContact:
                 "step() must be called within `with contact:`, where the simulator does not push these pairs apart"
             )
         duration = self.bodies.time_step
+        self._mechanics.announce_begin()
         self._mechanics.prepare()
         self._refresh()
         left, taken = duration, 0

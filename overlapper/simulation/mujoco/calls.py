@@ -54,6 +54,12 @@ def listen(listener: Listener) -> Callable[[], None]:
     return unlisten
 
 
+def begins(data: mujoco.MjData) -> None:
+    """Report to all listeners that a step of a simulation begins, unless it is the first step that is noticed."""
+    if data in _begun:
+        _tell("step begins", data)
+
+
 def stepped(data: mujoco.MjData) -> None:
     """Report a step to all listeners."""
     if _listeners and data not in _begun:
@@ -68,6 +74,7 @@ def _heard(function: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(function)
     def step(m: mujoco.MjModel, d: mujoco.MjData, *args: Any, **kwargs: Any) -> None:
         global _steps_of_call
+        begins(d)
         function(m, d, *args, **kwargs)
         _steps_of_call = int(args[0] if args else kwargs.get("nstep", 1))
         try:

@@ -38,6 +38,7 @@ class MujocoSource(Source):
     """See `Source`; the arguments are those of `Bodies`."""
 
     engine = "mujoco"
+    poses_lag = True
     contact = GeomContact
 
     def __init__(self, model: Any, data: Any, given_names: Mapping[int, str]) -> None:
@@ -50,6 +51,9 @@ class MujocoSource(Source):
         self._was_read = False
         self._rule: tuple[object, Layout, PairRule] | None = None
         self._filter_told = False
+        # At the end of the last step: time, coordinates, and the poses of mocap bodies.
+        self._end: tuple[float, Array, Array, Array] | None = None
+        self._spare: Any = None  # a second MjData, for poses at other coordinates
 
     @property
     def time_step(self) -> float:
@@ -73,6 +77,24 @@ class MujocoSource(Source):
 
     def poses(self, links: Mapping[int, Sequence[int]]) -> GeomPoses:
         return GeomPoses(self._data, [(body, geom) for body, geoms in links.items() for geom in geoms])
+
+    def step_ended(self) -> None:
+        data = self._data
+        self._end = data.time, data.qpos.copy(), data.mocap_pos.copy(), data.mocap_quat.copy()
+
+    def end_of_step(self, layout: Layout) -> tuple[Array, Array] | None:
+        """Mocap bodies are moved between steps. Only if the time goes back, this is a reset and not a motion."""
+        data = self._data
+        if self._end is None or np.array_equal(self._end[1], data.qpos):
+            return None
+        if self._spare is None:
+            self._spare = mujoco.MjData(self._model)
+        time, self._spare.qpos[:], *mocap = self._end
+        if data.time >= time:
+            mocap = [data.mocap_pos, data.mocap_quat]
+        self._spare.mocap_pos[:], self._spare.mocap_quat[:] = mocap
+        mujoco.mj_kinematics(self._model, self._spare)
+        return layout.placed(GeomPoses(self._spare, layout.poses.colliders).read())
 
     def rules(self, layout: Layout) -> PairRule:
         asked = contact_filter()

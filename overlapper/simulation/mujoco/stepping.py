@@ -14,7 +14,7 @@ import numpy as np
 from overlapper.printable import printable
 from overlapper.simulation.mechanics import OtherForces
 from overlapper.simulation.model import Array, LinkKey
-from overlapper.simulation.mujoco.calls import stepped, unheard
+from overlapper.simulation.mujoco.calls import begins, stepped, unheard
 from overlapper.simulation.mujoco.dynamics import MujocoDynamics
 from overlapper.simulation.mujoco.geoms import collidable
 from overlapper.simulation.mujoco.mocap import MocapMotion
@@ -163,6 +163,9 @@ class MujocoStepping:
 
     def stepped(self, duration: float) -> None:
         self._begins = True
+
+    def announce_begin(self) -> None:
+        begins(self.data)
 
     def announce(self) -> None:
         stepped(self.data)
