@@ -1,6 +1,7 @@
 """Random and graded motions of all pairs of shapes: no time of impact is late, and each interval contains the truth.
 
-    python benchmarks motions                  100,000 motions, the kinds in turn; writes the table and the page
+    python benchmarks motions                  100,000 motions, the kinds in turn
+    python benchmarks motions --record         keeps the table in benchmarks/results, and writes the page
     python benchmarks motions --count 2000     fewer, for a look
     python benchmarks motions --resume         goes on where a run ended that was stopped
 
@@ -25,6 +26,7 @@ from strategies import product as turned_by
 
 from harness import results
 from harness.command import ROOT, Wrong
+from motion import page
 from overlapper import (
     Box,
     Capsule,
@@ -253,3 +255,4 @@ def main(chosen: Namespace) -> None:
         ) as write:
             write(sums)
         print(f"Written: {TABLE}")
+        print(f"Written: {page.write_page(TABLE.with_name('motion.csv'), ROOT / 'docs')}")

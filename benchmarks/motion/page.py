@@ -9,11 +9,14 @@ from harness.page import duration, named, table, write
 
 ADVANCEMENT = ("advancement, libccd", "advancement, indep")
 FIGURES = ("missed", "late", "latest", "earliest")
+STATUSES = ("impact", "separated", "touching", "overlapping", "open")
 PEERS = (*ADVANCEMENT, "1,000 poses")
 
 
 def write_page(path: Path, folder: Path) -> Path:
     (note,), rows = results.read(path)
+    beside = path.with_name("motions.csv")
+    _, graded = results.read(beside if beside.exists() else next(results.FOLDER.glob("*/motions.csv")))
     found: dict[str, dict[str, dict[str, float]]] = {}
     for row in rows:
         found.setdefault(row["kind"], {}).setdefault(row["library"], {})[row["figure"]] = float(row["value"])
@@ -46,6 +49,17 @@ def write_page(path: Path, folder: Path) -> Path:
             answers,
         ),
         speed=table(["motion", "ours", "ours, one call", "libccd", "indep", "1,000 poses", "ours, slowest"], speed),
+        graded=table(
+            ["motions", *STATUSES, "wider", "late", "wrong"],
+            [
+                [row["kind"], *(f"{int(row[name]):,}" for name in (*STATUSES, "wide", "late", "false"))]
+                for row in graded
+            ],
+        ),
+        graded_count=f"{sum(int(row['motions']) for row in graded):,}",
+        graded_late=f"{sum(int(row['late']) for row in graded):,}",
+        graded_false=f"{sum(int(row['false']) for row in graded):,}",
+        graded_open=f"{sum(int(row['open']) for row in graded):,}",
         poses_missed=f"{sum(of['1,000 poses']['missed'] for of in found.values()):.0f}",
         early=small(max(of[peer]["early"] for of in found.values() for peer in ADVANCEMENT)),
         false=f"{sum(of[peer]['false'] for of in found.values() for peer in PEERS):.0f}",
