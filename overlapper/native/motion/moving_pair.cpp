@@ -12,8 +12,6 @@ constexpr int kMostValues = 48;
 /// Radians by which a direction turns before the next one is chosen.
 constexpr double kMostTurned = 2;
 
-constexpr double kNever = std::numeric_limits<double>::infinity();
-
 /// The rotation of a quaternion. Every entry is right to some units of the last place of 1.
 Mat3 quick_rotation(Quaternion q) {
   const double s = 2 / (q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);

@@ -6,6 +6,9 @@
 
 namespace overlapper {
 
+/// The time or the distance of what never meets.
+inline constexpr double kNever = std::numeric_limits<double>::infinity();
+
 /// The position moves along a line. The body turns about its position. Both velocities are constant in the world.
 struct Velocity {
   Vec3 linear;   ///< m/s

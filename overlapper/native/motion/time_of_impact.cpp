@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "distance/gjk.h"
@@ -15,8 +14,6 @@ namespace {
 
 /// More steps than any pair needs that comes closer steadily.
 constexpr int kMostPoses = 400;
-
-constexpr double kNever = std::numeric_limits<double>::infinity();
 
 /// The directions of the flat in which a body touches its supporting plane across the normal.
 struct Flat {
