@@ -151,7 +151,8 @@ def maximum_volume(
     duration : float, default 1.0
         Length of the motion in s.
     tolerance : float, default 1e-3
-        Wanted difference of the bounds, as a fraction of the upper bound.
+        Wanted difference of the bounds, as a fraction of the upper bound. The search ends after 20,000 poses. Volumes
+        of round bodies that graze by less than 1e-5 m may need more: then `converged` is False.
 
     Returns
     -------
