@@ -29,17 +29,22 @@ void cut_off(Polygon& polygon, Vec3 inwards, Vec3 from, Polygon& kept) {
 /// A facet's fan of triangles, and integrals over polygons in them.
 class HullSurface {
  public:
-  HullSurface(const Placed& body, Vec3 reference) : hull_(*polytope_of(body.shape)) {
-    const Placed relative = body.seen_from(reference);
-    for (Vec3 v : hull_.vertices) vertices_.push_back(relative.pose * v);
-    for (const Plane& plane : hull_.planes) planes_.push_back(relative.pose * plane);
+  /// Coordinates are about the origin of the region's frame.
+  HullSurface(const Placed& body, const Region& region) : hull_(*polytope_of(body.shape)) {
+    const Placed relative = body.seen_from(region.reference);
+    for (Vec3 v : hull_.vertices) {
+      vertices_.push_back(relative.pose * v - region.frame.origin);
+      reach_ = std::max(reach_, norm(vertices_.back()));
+    }
+    for (const Plane& own : hull_.planes) {
+      const Plane plane = relative.pose * own;
+      planes_.push_back({plane.normal, -signed_distance(plane, region.frame.origin)});
+    }
     gradient_.resize(vertices_.size()), moved_.resize(vertices_.size()), area_.resize(vertices_.size());
   }
 
   /// Adds a polygon of the common surface, in the plane of a facet of this body.
   void add(const Polygon& polygon, Vec3 normal) {
-    double size = 0;
-    for (Vec3 corner : polygon) size = std::max(size, norm(corner - polygon[0]));
     // Facets whose planes are as near to the corners as the nearest plane is, but for rounding.
     std::vector<double> off(planes_.size(), std::numeric_limits<double>::infinity());
     double nearest = std::numeric_limits<double>::infinity();
@@ -50,12 +55,16 @@ class HullSurface {
       nearest = std::min(nearest, off[f]);
     }
     for (size_t f = 0; f < planes_.size(); ++f)
-      if (off[f] <= 2 * nearest + kRounding * size) add_in_facet(static_cast<int>(f), polygon);
+      if (off[f] <= 2 * nearest + kRounding * reach_) add_in_facet(static_cast<int>(f), polygon);
   }
 
-  VertexGradient found(double owned, double misplaced, bool with_errors) const {
+  /// Adds the difference of the sum from the area vector of the body's part to the errors.
+  VertexGradient found(Vec3 force, double owned, double misplaced, bool with_errors) const {
     VertexGradient result{gradient_, {}};
     if (!with_errors) return result;
+    Vec3 sum;
+    for (Vec3 each : gradient_) sum += each;
+    owned += norm(sum - force);
     for (size_t v = 0; v < moved_.size(); ++v)
       result.error.push_back(owned + std::min(misplaced * moved_[v], area_[v]));
     return result;
@@ -97,7 +106,8 @@ class HullSurface {
   }
 
   const HullData& hull_;
-  std::vector<Vec3> vertices_;  ///< about the reference
+  std::vector<Vec3> vertices_;
+  double reach_ = 0;  ///< m: of the vertices
   std::vector<Plane> planes_;
   std::vector<Vec3> gradient_;
   std::vector<double> moved_;  ///< m: how the error grows with a corner's displacement
@@ -118,18 +128,19 @@ std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_e
     found[i].by_vertex.assign(count, {value, value, value});
     if (with_errors) found[i].error.assign(count, overlapping ? value : overlap.errors().gradient[i][0]);
     if (!known || !overlapping) continue;
-    const Vec3 reference = overlap.centroid();
-    const Boundary& boundary = overlap.boundary();
-    HullSurface surface(bodies[i], reference);
+    const Region& region = overlap.drawn();
+    HullSurface surface(bodies[i], region);
     Polygon polygon;
-    for (int f = 0; f < static_cast<int>(boundary.planes.size()); ++f) {
-      if (boundary.owner[f] != static_cast<int>(i)) continue;
+    for (int f = 0; f < region.polytope.facets(); ++f) {
+      if (region.facets[f].owner != static_cast<int>(i)) continue;
       polygon.clear();
-      for (int v : boundary.facet(f)) polygon.push_back(boundary.vertices[v] - reference);
-      surface.add(polygon, boundary.planes[f].normal);
+      for (int v : region.polytope.facet(f)) polygon.push_back(region.frame.axes * region.polytope.vertices[v]);
+      surface.add(polygon, region.facets[f].normal);
     }
+    const auto force = overlap.gradient()[i];
     const double owned = with_errors ? overlap.errors().gradient[i][0] : 0;
-    found[i] = surface.found(owned, with_errors ? overlap.errors().vertices : 0, with_errors);
+    found[i] =
+        surface.found({force[0], force[1], force[2]}, owned, with_errors ? overlap.errors().vertices : 0, with_errors);
   }
   return found;
 }

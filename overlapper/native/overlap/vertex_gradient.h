@@ -20,9 +20,10 @@ struct VertexGradient {
 /// than three corners counts as a fan of triangles from its first corner. The volume has other one-sided derivatives
 /// there, for vertices that leave the facet in other ways. All of them agree for vertices that stay in one plane.
 ///
-/// Two bounds add up to an error. Area may belong to another body, or be missing, as bounded by Errors::gradient.
+/// Three numbers add up to an error. Area may belong to another body, or be missing, as bounded by Errors::gradient.
 /// Corners may be misplaced, as bounded by Errors::vertices. They change a coordinate by that distance over the height
-/// of the triangle.
+/// of the triangle. All vertices together have the area vector of the body's part; the difference counts. Other ways to
+/// fold a facet are not in the errors.
 std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_errors);
 
 }  // namespace overlapper

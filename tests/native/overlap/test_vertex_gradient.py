@@ -59,6 +59,29 @@ def test_vertices_of_hulls_of_triangles_against_rational_arithmetic(seed):
         assert_allclose(found.vertex_gradients[body].sum(0), found.gradient[body, :3], atol=1e-13 * case.truth.area)
 
 
+@pytest.mark.parametrize("family", ["slivers", "tilted_slivers", "needles_and_plates", "tiny_in_huge", "far_away"])
+def test_stated_errors_of_hard_pairs_hold(family):
+    compared = 0
+    for seed in range(12):
+        case = make(family, seed)
+        found = overlap(*case.placed)
+        if case.truth.dimension < 3 or any(len(facet.owners) > 1 for facet in case.truth.facets):
+            continue
+        for body, points in enumerate(case.bodies):
+            hull = Hull(points)
+            exact_points = [exact.point(p) for p in hull.vertices]
+            triangles = all(len(facet) == 3 for facet in hull.facets)
+            if not triangles or {*exact_points} != {*case.solids[body].vertices} or found.status != "overlapping":
+                continue
+            exactly = by_vertices(case, body)
+            expected = np.array([[float(x) for x in exactly[p]] for p in exact_points])
+            off = np.linalg.norm(found.vertex_gradients[body] - expected, axis=1)
+            assert (off <= found.errors.vertex_gradients[body]).all(), case
+            assert off.max() <= 1e-4 * case.truth.area, case
+            compared += 1
+    assert compared >= 4
+
+
 def test_a_moved_vertex_against_differences_of_exact_volumes():
     # The volume is a polynomial in the place of a vertex until the next corner passes a plane.
     rng = np.random.default_rng(5)
