@@ -14,7 +14,7 @@ from contact_experiments import HALF, G, World, run
 
 from overlapper.quaternion import rotated
 from overlapper.simulation import TactileImage, TaxelGrid, Taxels
-from overlapper.simulation.forces.cells import moments
+from overlapper.simulation.forces.cells import moments, nearest
 
 DOWN = (1, 0, 0, 0)  # half a turn about x: the normal of a pad below a body
 
@@ -396,3 +396,16 @@ def test_invalid_questions_are_refused_in_one_sentence(world):
 def test_pads_have_a_readable_repr():
     assert repr(sole((2, 3))) == "TaxelGrid(size=[0.1, 0.1], shape=(2, 3))"
     assert repr(Taxels([[0, 0, 0]], [[0, 0, 1]], 0.5)) == "Taxels(1 points, reach=0.5)"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_cells_of_a_turned_lattice_leave_no_gap(seed):
+    """Four cells meet at each corner. Rounding parts these corners by edges of any direction."""
+    turn = np.random.default_rng(seed).uniform(0, 2 * np.pi)
+    points = np.stack(np.meshgrid(np.linspace(-0.018, 0.018, 7), np.linspace(-0.013, 0.013, 5)), -1).reshape(-1, 2)
+    points = points @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    offsets = points[None] - points[:, None]
+    offsets[range(35), range(35)] = np.inf
+    cells = points[:, None] + nearest(offsets, 0.02)
+    corners = np.array([[-0.015, -0.01, 1], [0.015, -0.01, 1], [0, 0.012, 1]])
+    assert moments(corners[None], cells)[:, 0].sum() == pytest.approx(0.03 * 0.022 / 2, rel=1e-12)

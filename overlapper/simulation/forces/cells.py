@@ -10,6 +10,9 @@ from overlapper.simulation.model import Array
 # A taxel reaches as far as a regular polygon with so many corners.
 CORNERS = 16
 
+# Rounding decides the direction of an edge that is shorter, over the breadth of its cell. Such an edge bounds nothing.
+TINY = 1e-8
+
 
 def moments(triangles: Array, cells: Array) -> Array:
     """(n, 3) integrals of the height h, of x h and of y h over what a surface has within each cell.
@@ -26,8 +29,11 @@ def moments(triangles: Array, cells: Array) -> Array:
         near &= high[:, None, axis] >= least[:, axis]
     which, owner = np.nonzero(near)
     parts = triangles[which]
+    starts = np.roll(cells, 1, axis=1)
+    short = np.abs(cells - starts).max(axis=2) < TINY * (most - least).max(axis=1)[:, None]
+    starts = np.where(short[..., None], cells, starts)
     for k in range(cells.shape[1]):
-        parts, left = _left_of(parts, cells[owner, k - 1], cells[owner, k])
+        parts, left = _left_of(parts, starts[owner, k], cells[owner, k])
         owner = owner[left]
     found = np.empty((len(cells), 3))
     for column, values in enumerate(_integrals(parts).T):
