@@ -7,7 +7,7 @@ for as long as one looks. The overlap is a wedge that becomes a sheet of a tenth
 import pybullet as p
 
 STEPS = 300
-CONTACT = "volumetric"
+CONTACT = {"stiffness": 1e7}
 SIDE, TILT, DROP = 0.1, 1e-3, 1e-3
 
 

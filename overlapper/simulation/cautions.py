@@ -17,6 +17,10 @@ class NoDirectionWarning(UserWarning):
     """A body lies within another or goes through it, so their overlap has no side to push to."""
 
 
+class DepthWarning(UserWarning):
+    """Two bodies are so deep in each other that their contact is no surface layer."""
+
+
 class UnsettledWarning(UserWarning):
     """The solver of contact forces has ended before they were accurate."""
 

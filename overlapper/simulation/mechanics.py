@@ -47,6 +47,12 @@ class Dynamics(Protocol):
     def friction(self, pairs: NDArray[np.int64]) -> Array:
         """(p,) the simulator's coefficients of friction of `pairs` (p, 2), which are pairs of indices in `links`."""
 
+    def resistance(self, pairs: NDArray[np.int64]) -> dict[str, Array]:
+        """(p,) the simulator's `restitution`, and `rolling` and `spinning` friction in m, of such `pairs` (p, 2)."""
+
+    def weights(self) -> Array:
+        """(n,) for each of `links`: the weight in N of its whole body with all joints, 0 if forces do not move it."""
+
     def read(self) -> bool:
         """Read masses and friction again. True if masses have changed, so that there is a new solver."""
 

@@ -96,7 +96,7 @@ def test_a_swinging_pole_is_detected_before_it_hits(client):
 def test_bodies_without_mass_slip_without_a_response(client):
     """Neither body has a mass. One moves at a given velocity, and friction cannot end its slip."""
     plane, box = ground(client), _box(client, [0, 0, 0.049], mass=0, velocity=[0.1, 0, 0])
-    with VolumetricContact(Bodies(client), pairs=[(plane, box)]) as contact:
+    with VolumetricContact(Bodies(client), pairs=[(plane, box)], stiffness=1e7) as contact:
         contact.step()
     pressing = 1e7 * 0.01 * 1e-3
     assert contact.force[0] == pytest.approx([0.25 * pressing, 0, -pressing], rel=1e-9)
@@ -141,7 +141,7 @@ def test_bullet_does_not_respond_either_once_a_body_gets_a_mass(client):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
     ground(client)
     box = _box(client, [0, 0, 0.05], mass=0)
-    with VolumetricContact(Bodies(client)) as contact:
+    with VolumetricContact(Bodies(client), stiffness=1e7) as contact:
         contact.step()
         pybullet.changeDynamics(box, -1, mass=1, physicsClientId=client)
         assert _rests(client, box, contact)
@@ -153,7 +153,7 @@ def test_bullet_does_not_respond_either_to_pairs_that_a_script_lets_collide(clie
         plane, box = ground(client), _box(client, [0, 0, 0.05])
         pybullet.setCollisionFilterGroupMask(plane, -1, 1, 1, physicsClientId=client)
         pybullet.setCollisionFilterGroupMask(box, -1, 2, 2, physicsClientId=client)
-        with VolumetricContact(Bodies(client, recorder=recorder)) as contact:
+        with VolumetricContact(Bodies(client, recorder=recorder), stiffness=1e7) as contact:
             pybullet.setCollisionFilterGroupMask(box, -1, 1, 1, physicsClientId=client)
             assert _rests(client, box, contact)
             pybullet.setCollisionFilterPair(plane, box, -1, -1, 0, physicsClientId=client)
@@ -176,7 +176,7 @@ def test_a_restored_state_forgets_everything_that_came_after_it(client):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
     ground(client)
     box, ways = _box(client, [0, 0, 0.05 - G / 1e5]), []
-    with VolumetricContact(Bodies(client)) as contact:
+    with VolumetricContact(Bodies(client), stiffness=1e7) as contact:
         for _ in range(20):
             contact.step()
         state = pybullet.saveState(client)

@@ -108,10 +108,10 @@ def test_a_body_in_parts_feels_the_force_of_the_whole(pieces):
 @pytest.mark.parametrize("dissipation", [0.0, 1e-3, None])
 def test_a_body_in_parts_that_moves_feels_the_force_of_the_whole_as_far_as_it_is_solved(dissipation):
     """Sweeps end when slips have settled to 1e-9 of the largest. Without a dissipation, parts share their damping."""
-    moving = {"linear": (0.1, 0, -0.3), "angular": (0.5, 1, 0.2), "dissipation": dissipation}
+    moving = {"linear": (0.1, 0, -0.3), "angular": (0.5, 1, 0.2), "dissipation": dissipation, "stiffness": 1e7}
     whole, parts = pressed((1, 1, 1), STEP / 4, **moving), pressed((2, 2, 2), STEP / 4, **moving)
     for one, other in zip(whole, parts):
-        assert np.linalg.norm(one - other) < (1e-7 if dissipation is None else 1e-9) * np.linalg.norm(one)
+        assert np.linalg.norm(one - other) < (1e-5 if dissipation is None else 1e-9) * np.linalg.norm(one)
 
 
 # Energy
@@ -309,7 +309,7 @@ def test_a_robot_answers_to_forces_as_the_solver_says(client, file, fixed, link)
 def test_a_body_that_gets_within_another_is_pushed_as_it_was_last(client):
     box(client, 0.5, mass=0)
     small = box(client, 0.1, position=(0.55, 0, 0))
-    contact = VolumetricContact(Bodies(client))
+    contact = VolumetricContact(Bodies(client), dissipation=1e-3)
     with contact:
         contact.step()
         assert contact.last.directed.all()
@@ -333,7 +333,7 @@ def test_a_body_that_gets_within_another_is_pushed_as_it_was_last(client):
 def test_a_body_that_is_within_another_from_the_first_is_pushed_the_shortest_way_out(client):
     box(client, 0.5, mass=0)
     small = box(client, 0.1, position=(0.1, -0.3, 0.05))
-    with VolumetricContact(Bodies(client)) as contact:
+    with VolumetricContact(Bodies(client), dissipation=1e-3) as contact:
         with pytest.warns(NoDirectionWarning, match="without a direction of force"):
             contact.step()
         force = contact.on(small)[0]
@@ -343,13 +343,23 @@ def test_a_body_that_is_within_another_from_the_first_is_pushed_the_shortest_way
 def test_a_rod_through_a_plate_has_no_direction(client):
     plate = body(client, p.GEOM_BOX, halfExtents=[0.5, 0.5, 0.005], mass=0)
     rod = body(client, p.GEOM_BOX, halfExtents=[0.01, 0.01, 0.3])
-    with VolumetricContact(Bodies(client)) as contact:
+    with VolumetricContact(Bodies(client), dissipation=1e-3) as contact:
         with pytest.warns(NoDirectionWarning, match="goes through it"):
             contact.step()
         assert not contact.last.directed.any()
         force = contact.on(rod)[0]
         assert np.linalg.norm(force) == pytest.approx(1e7 * 0.02**2 * 0.01)
         assert contact.on(plate)[0] == pytest.approx(-force)
+
+
+@pytest.mark.parametrize("size", [0.02, 0.2])
+def test_a_body_within_another_is_pushed_out_with_its_size_over_the_time_of_recovery_at_most(client, size):
+    box(client, 0.5, mass=0)
+    small = box(client, size / 2, position=(0.1, -0.3, 0.05))
+    with VolumetricContact(Bodies(client)) as contact:
+        with pytest.warns(NoDirectionWarning, match="without a direction of force"):
+            contact.step()
+        assert 0.5 * size / 0.02 < np.linalg.norm(p.getBaseVelocity(small, client)[0]) < size / 0.02
 
 
 # Where the law is not a plane's

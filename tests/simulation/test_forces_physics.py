@@ -42,11 +42,6 @@ def test_dissipation_determines_the_loss_of_a_bounce_at_any_speed(dissipation, d
     assert experiments.restitution(dissipation, drop) == pytest.approx(experiments.rebound(dissipation), abs=0.01)
 
 
-def test_critical_damping_by_default_leaves_less_than_its_share_of_the_speed_of_a_bounce():
-    """A critically damped spring that does not draw gives back exp(-2) of the speed. Dissipation takes more."""
-    assert 0.05 < experiments.restitution(None) < math.exp(-2)
-
-
 def test_the_damping_by_default_does_not_slow_what_rolls():
     rolled = [experiments.roll("ball", dissipation=tau, seconds=0.5) for tau in (None, 1e-3)]
     assert rolled[0] == pytest.approx(rolled[1], rel=1e-6)

@@ -69,7 +69,12 @@ def test_a_client_that_is_disconnected_within_the_block_is_not_told(client):
         ({"stiffness": math.inf}, "stiffness must be a number in Pa/m greater than 0, not inf"),
         ({"stiffness": "hard"}, "stiffness must be a number in Pa/m greater than 0, not 'hard'"),
         ({"stiffness": "1e7"}, "stiffness must be a number in Pa/m greater than 0, not '1e7'"),
-        ({"stiffness": None}, "stiffness must be a number in Pa/m greater than 0, not None"),
+        (
+            {"restitution": 0.5, "dissipation": 0},
+            "restitution must not be given with dissipation, which determines how bodies bounce",
+        ),
+        ({"restitution": -1, "dissipation": None}, "restitution must be a number 0 or greater, not -1"),
+        ({"rolling": "x"}, "rolling must be a number in m 0 or greater, not 'x'"),
         ({"dissipation": -1e-3}, "dissipation must be a number in s 0 or greater, not -0.001"),
         ({"dissipation": [1]}, "dissipation must be a number in s 0 or greater, not [1]"),
         ({"friction": "foo"}, "friction must be a number 0 or greater, or 'distributed', not 'foo'"),
@@ -516,7 +521,7 @@ def test_step_simulation_within_the_block_is_a_step(world, recorded):
     other = p.connect(p.DIRECT)
     original = p.stepSimulation
     with Recorder(world.client) if recorded else contextlib.nullcontext() as recorder:
-        contact = VolumetricContact(Bodies(world.client, recorder=recorder), substeps=4)
+        contact = VolumetricContact(Bodies(world.client, recorder=recorder), stiffness=1e7, substeps=4)
         steps = []
         with overlapper.watch(world.client) as watch, contact:
             for step in (p.stepSimulation, lambda: p.stepSimulation(physicsClientId=world.client)) * 60:

@@ -74,7 +74,7 @@ def resting_cube(**options):
 
 @contextmanager
 def pressing(model, data, **parameters):
-    with VolumetricContact(Bodies(model, data), **parameters) as contact:
+    with VolumetricContact(Bodies(model, data), **{"dissipation": 1e-3} | parameters) as contact:
         yield contact
 
 
@@ -331,7 +331,7 @@ def test_a_cube_that_sticks_to_a_turntable_does_not_creep():
     cube = free('<geom type="box" size="0.03 0.03 0.03" mass="1"/>', "0.3 0 1.0797275")
     model, data = simulated(f'<body pos="0 0 1"><joint type="hinge" axis="0 0 1"/>{disc}</body>{cube}', step=0.004)
     data.qvel[:] = [3, 0, 0.9, 0, 0, 0, 3]
-    with VolumetricContact(Bodies(model, data)) as contact:
+    with VolumetricContact(Bodies(model, data), dissipation=1e-3) as contact:
         for _ in range(750):
             contact.step()
         before = np.linalg.norm(data.qpos[1:3])
@@ -359,7 +359,7 @@ def test_friction_is_that_of_mujoco():
                 model.opt.o_friction[0] = 0.33
             mujoco.mj_forward(model, data)
             first, second = data.contact.geom.T.astype(int)
-            wanted = np.where(data.contact.dim == 1, 0, data.contact.friction[:, 0])
+            wanted = np.where(data.contact.dim[:, None] >= (2, 4, 6), data.contact.friction[:, [0, 2, 3]], 0)
             assert len(wanted) == 15
             assert friction(model, first, second) == pytest.approx(wanted)
             assert friction(model, second, first) == pytest.approx(wanted)
@@ -372,7 +372,7 @@ def test_contacts_are_off_within_the_block_and_come_back_after_an_exception():
     model, data = resting_cube()
     assert data.ncon
     bodies = Bodies(model, data)
-    contact = VolumetricContact(bodies)
+    contact = VolumetricContact(bodies, dissipation=1e-3)
     before = bodies.rules
 
     def broken():
@@ -400,7 +400,7 @@ def test_sensors_of_contacts_are_named_once():
     sensor = '<site name="skin" type="box" size=".06 .06 .06"/>'
     rest = '<sensor><touch name="press" site="skin"/><touch site="skin"/><gyro site="skin"/></sensor>'
     model, data = simulated(free('<geom type="box" size=".05 .05 .05"/>' + sensor, "0 0 .0499"), rest=rest)
-    contact = VolumetricContact(Bodies(model, data))
+    contact = VolumetricContact(Bodies(model, data), dissipation=1e-3)
     with pytest.warns(UserWarning, match="so these sensors read 0: press, sensor 1$") as told, contact:
         contact.step()
     assert len(told) == 1 and told[0].filename == __file__ and not data.sensordata[:2].any()
@@ -485,7 +485,7 @@ def test_forces_of_data_that_diverged_are_those_of_its_reset():
 def test_forces_are_told_without_a_step():
     model, data = resting_cube()
     state = np.concatenate([data.qpos, data.qvel, [data.time]])
-    contact = VolumetricContact(Bodies(model, data))
+    contact = VolumetricContact(Bodies(model, data), dissipation=1e-3)
     found = contact.forces()
     assert found.on(1)[0] == pytest.approx([0, 0, G]) and model.opt.disableflags == 0
     assert np.array_equal(state, [*data.qpos, *data.qvel, data.time]) and not data.xfrc_applied.any()
@@ -579,7 +579,7 @@ def test_a_control_callback_of_the_script_is_called_first_and_comes_back():
 
 def test_contacts_may_end_in_any_order():
     models = [resting_cube() for _ in range(2)]
-    first, second = (VolumetricContact(Bodies(*each)) for each in models)
+    first, second = (VolumetricContact(Bodies(*each), dissipation=1e-3) for each in models)
     first.__enter__()
     second.__enter__()
     first.__exit__()
@@ -636,7 +636,7 @@ def test_a_control_callback_of_c_is_refused():
         with pytest.raises(
             ValueError, match=r"^mujoco\.set_mjcb_control has set a function of C: VolumetricContact can"
         ):
-            VolumetricContact(Bodies(model, data)).__enter__()
+            VolumetricContact(Bodies(model, data), dissipation=1e-3).__enter__()
     finally:
         mujoco.set_mjcb_control(None)
     assert model.opt.disableflags == 0
@@ -649,7 +649,7 @@ def test_a_control_callback_of_c_is_refused():
 def test_other_integrators_are_refused(name):
     model, data = resting_cube()
     said = f"^VolumetricContact needs MuJoCo's Euler integrator, not {name}: set model.opt.integrator = "
-    contact = VolumetricContact(Bodies(model, data))
+    contact = VolumetricContact(Bodies(model, data), dissipation=1e-3)
     with contact:
         model.opt.integrator = int(getattr(mujoco.mjtIntegrator, f"mjINT_{name}"))
         with pytest.raises(ValueError, match=said):
@@ -657,7 +657,7 @@ def test_other_integrators_are_refused(name):
     with pytest.raises(ValueError, match=said):
         contact.__enter__()
     with pytest.raises(ValueError, match=said):
-        VolumetricContact(Bodies(model, data))
+        VolumetricContact(Bodies(model, data), dissipation=1e-3)
     assert model.opt.disableflags == 0
 
 
@@ -665,7 +665,7 @@ def test_sleeping_bodies_are_refused():
     model, data = resting_cube()
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     with pytest.raises(ValueError, match=r"^VolumetricContact does not support sleeping bodies: "):
-        VolumetricContact(Bodies(model, data))
+        VolumetricContact(Bodies(model, data), dissipation=1e-3)
 
 
 @pytest.mark.filterwarnings("ignore::overlapper.simulation.cautions.SkippedShapeWarning")
@@ -684,7 +684,7 @@ def test_geoms_that_are_not_modelled_are_refused():
         model.hfield_size[:, 3] = 0
         mujoco.mj_forward(model, data)
         with pytest.raises(ValueError, match=f"^VolumetricContact cannot replace MuJoCo's contacts of {named}"):
-            VolumetricContact(Bodies(model, data))
+            VolumetricContact(Bodies(model, data), dissipation=1e-3)
 
 
 def test_pairs_must_contain_all_that_collide():
@@ -733,7 +733,7 @@ def test_a_scene_may_ask_for_volumetric_contact():
     scene = load_scene("cube.xml")
     with closing(run(scene, 20, contact="volumetric")) as frames:
         *_, last = frames
-    assert last.forces.on(1)[0] == pytest.approx([0, 0, G])
+    assert last.forces.on(1)[0] == pytest.approx([0, 0, G], rel=1e-2)
     Path("round.xml").write_text("<mujoco><option integrator='RK4'/><worldbody><geom size='1'/></worldbody></mujoco>")
     with pytest.raises(overlapper.scenes.scene.SceneError, match="has an invalid CONTACT: VolumetricContact needs"):
         next(run(load_scene("round.xml"), contact="volumetric"))

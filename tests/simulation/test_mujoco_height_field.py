@@ -237,7 +237,7 @@ def moved(body, heights, steps, speed=0.0, tilt="", **law):
     """The pose of a body after steps on a field, whose cells are 0.1 m wide."""
     model, data = hills(body, where=tilt, heights=heights, size=".8 .8 .8 .8")
     data.qvel[0] = speed
-    with VolumetricContact(Bodies(model, data), friction=0.5, **law) as contact:
+    with VolumetricContact(Bodies(model, data), friction=0.5, **{"stiffness": 1e7} | law) as contact:
         for _ in range(steps):
             contact.step()
         return data.qpos.copy(), contact.mean()

@@ -5,8 +5,6 @@
 #include <map>
 #include <utility>
 
-#include "forces/pressure.h"
-
 namespace overlapper {
 namespace {
 
@@ -35,8 +33,10 @@ Vec3 rotation_vector(const Mat3& turn) {
 struct ContactSolver::Laws {
   Pressure pressure;
   PatchFriction friction;
-  Six wrench;
+  Six wrench;  ///< of pressures, friction and rolling resistance
   Drift drift;
+  Three rolling{};              ///< the part of the rolling resistance, normal
+  double shift = 0;             ///< of the rolling resistance, see opposing()
   double relative_damping = 0;  ///< N, see find_relative_damping()
 };
 
@@ -97,37 +97,34 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
   return frequency2;
 }
 
-/// Finds the damping along the normals. The patches of two links are damped as one patch, as far as they have the same
-/// normal: a body that consists of parts moves like a whole body. The damping follows the mean of their slips, weighted
-/// by their forces. This is the slip at the centroid of the whole volume.
+/// Finds the damping along the normals by `recovery`. The patches of two links are damped as one patch, as far as they
+/// have the same normal: a body that consists of parts moves like a whole body. The damping follows the mean of their
+/// slips, weighted by their forces. This is the slip at the centroid of the whole volume.
 void ContactSolver::share_damping() {
   std::map<std::pair<int, int>, std::vector<int>> of_links;
-  for (int i = 0; i < int(rows_.size()); ++i)
-    if (patches_[i].damping > 0 && rows_[i].area.area > 0)
-      of_links[{patches_[i].link_a, patches_[i].link_b}].push_back(i);
+  for (int i = 0; i < int(rows_.size()); ++i) {
+    const ElasticPatch& patch = patches_[i];
+    if (!(patch.recovery > 0 && patch.force > 0)) continue;
+    if (patch.area > 0) {
+      of_links[{patch.link_a, patch.link_b}].push_back(i);
+    } else {
+      // A body without a direction leaves the other one with its own size over the time of recovery at most.
+      const double size = std::cbrt(patch.force / patch.stiffness);
+      rows_[i].damping = patch.recovery * patch.stiffness * size * size;
+    }
+  }
   for (const auto& [links, group] : of_links) {
     for (int i : group) {
       double stiffness = 0, force = 0;
-      Vec3 centroid;
       std::vector<Share> shares;
       for (int j : group) {
         const ElasticPatch& other = patches_[j];
         const double same = j == i ? 1 : std::max(0.0, overlapper::dot(patches_[i].normal, other.normal));
         stiffness += same * other.stiffness * rows_[j].area.area;
-        force += same * other.force, centroid += same * other.force * (other.centroid - patches_[i].centroid);
+        force += same * other.force;
         if (j != i && same > 0) shares.push_back({j, same * other.force});
       }
-      double mobility = rows_[i].normal_by_normal[0][0];
-      if (!shares.empty()) {
-        ElasticPatch whole = patches_[i];
-        whole.centroid += centroid / force;
-        Row row(whole);
-        add_sides(row, whole);
-        mobility = row.normal_by_normal[0][0];
-      }
-      // The bodies' mass along the normal is the inverse of their mobility.
-      if (!(mobility > 0)) continue;
-      rows_[i].damping = 2 * patches_[i].damping * std::sqrt(stiffness / mobility) * (patches_[i].force / force);
+      rows_[i].damping = patches_[i].recovery * stiffness * (patches_[i].force / force);
       for (Share& share : shares) share.part *= rows_[i].damping / force;
       rows_[i].damped_with = std::move(shares);
     }
@@ -308,12 +305,27 @@ ContactSolver::Drift ContactSolver::drift(size_t patch, const Step& step, std::s
   return {rows_[patch].local({along, twist[0] - twist[1]}).tangential, stays};
 }
 
-/// Updates pressures first, then friction, because pressures limit friction. Returns the change of the slip.
+Pressure::Damping ContactSolver::damping(size_t patch, std::span<const Six> before, double staying) const {
+  const Row& row = rows_[patch];
+  if (!(row.damping > 0)) return {};
+  double approach = before[patch].normal[0];
+  for (const auto [other, part] : row.damped_with)
+    approach += part / row.damping * (before[other].normal[0] - before[patch].normal[0]);
+  return {row.damping, approach, staying};
+}
+
+/// Updates pressures first, then rolling resistance and friction, because pressures limit these. Returns the change of
+/// the slip.
 double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const {
   const Row& row = rows_[patch];
   const Six slip = slip_of(row, velocity), last = laws.wrench;
-  const Three without = slip.normal - duration * (row.normal_by_normal * last.normal);
-  laws.wrench.normal = laws.pressure.answer(without, laws.relative_damping);
+  const Three pressures = last.normal - laws.rolling;
+  const Three without = slip.normal - duration * (row.normal_by_normal * pressures);
+  laws.wrench.normal = laws.pressure.answer(without, laws.relative_damping) + laws.rolling;
+  if (patches_[patch].rolling > 0) {
+    const Three pressed = laws.wrench.normal - last.normal;
+    roll(patch, laws, duration, slip.normal + duration * (row.normal_by_normal * pressed));
+  }
   const Three pressed = laws.wrench.normal - last.normal;
   const Three tangential = slip.tangential + laws.drift.slip + duration * (row.tangential_by_normal * pressed);
   laws.wrench.tangential = laws.friction.answer(tangential, last.tangential, laws.wrench.normal[0]);
@@ -322,6 +334,16 @@ double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span
   const Three normal = row.normal_by_normal * change.normal + row.normal_by_tangential * change.tangential;
   const Three along = row.tangential_by_normal * change.normal + row.tangential_by_tangential * change.tangential;
   return duration * std::max({std::abs(normal[0]), std::abs(along[0]), std::abs(along[1])});
+}
+
+/// Updates the rolling resistance: Coulomb's law for the two angular velocities of `slip`, a normal part.
+void ContactSolver::roll(size_t patch, Laws& laws, double duration, const Three& slip) const {
+  ThreeByThree mobility = duration * rows_[patch].normal_by_normal;
+  const Three had = laws.rolling, pressure = laws.wrench.normal - had;
+  const Three free = slip - mobility * had;
+  mobility[0] = {1, 0, 0}, mobility[1][0] = mobility[2][0] = 0;
+  laws.rolling = opposing(mobility, {0, free[1], free[2]}, patches_[patch].rolling * pressure[0], laws.shift);
+  laws.wrench.normal = pressure + laws.rolling;
 }
 
 /// Extrapolates the wrenches after a sweep there and back (Nesterov 1983). It begins anew when the sweeps go against
@@ -363,16 +385,20 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   std::vector<Laws> laws;
   laws.reserve(count);
   double largest = 0;
+  std::vector<Six> before;
+  for (const Row& row : rows_) before.push_back(slip_of(row, step.velocity));
   for (int i = 0; i < count; ++i) {
     const ElasticPatch& patch = patches_[i];
     const Row& row = rows_[i];
-    const Six before = slip_of(row, step.velocity), free = slip_of(row, velocity);
+    const Six free = slip_of(row, velocity);
     largest = std::max({largest, std::abs(free.normal[0]), std::abs(free.tangential[0]), std::abs(free.tangential[1])});
     const Rule rule = step.damped[i] ? Rule::kDamping : Rule::kKeeping;
-    laws.push_back({{patch, row.area, row.normal_by_normal, row.damping, before.normal, h, rule},
-                    {patch.friction, row.area, h * row.tangential_by_tangential, step.friction},
+    const Drift drifts = drift(i, step, ahead);
+    const Pressure::Damping damped = damping(i, before, drifts.staying);
+    laws.push_back({{patch, row.area, row.normal_by_normal, damped, before[i].normal, h, rule},
+                    {patch, row.area, h * row.tangential_by_tangential, step.friction},
                     known_wrench(i),
-                    drift(i, step, ahead)});
+                    drifts});
     laws[i].wrench.tangential = laws[i].friction.begin(laws[i].wrench.tangential);
   }
   for (int i = 0; i < count; ++i) push(rows_[i], laws[i].wrench, h, velocity);

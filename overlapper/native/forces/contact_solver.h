@@ -8,6 +8,7 @@
 #include "forces/elastic_patch.h"
 #include "forces/friction.h"
 #include "forces/multibody.h"
+#include "forces/pressure.h"
 #include "forces/three.h"
 #include "geometry/vec.h"
 
@@ -92,7 +93,7 @@ class ContactSolver {
     PlaneArea area;
     std::array<Side, 2> sides{};
     int sides_used = 0;
-    double damping = 0;              ///< N s/m, along the normal
+    double damping = 0;              ///< N s/m, along the normal, by `recovery`
     std::vector<Share> damped_with;  ///< the other patches of the same two links
     /// The change of the slip by a wrench in 1 s: of the normal part by the normal part, and so on.
     ThreeByThree normal_by_normal{}, normal_by_tangential{}, tangential_by_normal{}, tangential_by_tangential{};
@@ -131,6 +132,8 @@ class ContactSolver {
   Six known_wrench(size_t patch) const;
   double staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const;
   Drift drift(size_t patch, const Step& step, std::span<const MovedOn> ahead) const;
+  Pressure::Damping damping(size_t patch, std::span<const Six> before, double staying) const;
+  void roll(size_t patch, Laws& laws, double duration, const Three& slip) const;
   double visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const;
   void extrapolate(Momentum& momentum, std::span<Laws> laws, double duration, std::span<double> velocity) const;
   Solution solved(std::span<const Laws> laws, std::span<const double> velocity) const;

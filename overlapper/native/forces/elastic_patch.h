@@ -16,8 +16,11 @@ struct ElasticPatch {
   double force = 0;          ///< N, at rest
   double stiffness = 0;      ///< Pa/m
   double dissipation = 0;    ///< s
-  double damping = 0;        ///< damping ratio of motion along the normal, besides the dissipation
+  double recovery = 0;       ///< s: by this time more, pressures follow the mean motion of the two links along normals
+  double restitution = 0;    ///< speed after an impact over the speed before; only with a recovery
   double friction = 0;       ///< coefficient of friction
+  double rolling = 0;        ///< m: the largest torque against rolling, over the force
+  double spinning = 0;       ///< m: the torque against spinning besides the friction on the area, over the force
   double area = 0;           ///< m²; 0 for a patch without a direction, whose force does not depend on the depth
   Vec3 centre;               ///< m, of this area
   Mat3 moments{{}, {}, {}};  ///< m⁴, of this area about its centre

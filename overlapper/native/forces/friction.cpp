@@ -66,8 +66,10 @@ Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, do
   return (size > limit ? -limit / size : -1) * force;
 }
 
-PatchFriction::PatchFriction(double coefficient, const PlaneArea& area, const ThreeByThree& mobility, Friction kind)
-    : coefficient_(coefficient), distance_(area.distance > 0 ? area.distance : 0), mobility_(mobility) {
+PatchFriction::PatchFriction(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility,
+                             Friction kind)
+    : coefficient_(patch.friction), distance_(area.distance > 0 ? area.distance : 0), mobility_(mobility) {
+  if (area.area > 0 && coefficient_ > 0) distance_ += patch.spinning / coefficient_;
   if (kind == Friction::kDistributed && area.area > 0) {
     spread(area);
   } else {

@@ -24,7 +24,7 @@ Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, do
 class PatchFriction {
  public:
   /// `mobility` times the forces of friction is the change of the slip within the step.
-  PatchFriction(double coefficient, const PlaneArea& area, const ThreeByThree& mobility, Friction kind);
+  PatchFriction(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, Friction kind);
 
   /// Begins with known forces, limited to those that this law allows, and returns them.
   Three begin(const Three& known);

@@ -9,6 +9,9 @@ namespace {
 /// The centre of pressure stays within this many squared radii of gyration: the border of a rectangle, on its axes.
 constexpr double kReach2 = 3;
 
+/// Bodies that approach each other more slowly, in m/s, do not bounce. It is Bullet's restitutionVelocityThreshold.
+constexpr double kImpact = 0.2;
+
 /// The pressure at the end of the step includes the velocity times this part of the step.
 double ahead(Rule rule) { return rule == Rule::kKeeping ? 0.25 : 1; }
 
@@ -33,16 +36,19 @@ ThreeByThree PlaneArea::foundation(double stiffness) const {
            {-k * u, -k * (uv + u * v), k * (uu + u * u)}}};
 }
 
-Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, double damping,
-                   const Three& before, double duration, Rule rule)
+Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility,
+                   const Damping& damping, const Three& before, double duration, Rule rule)
     : area_(area), mobility_(mobility), duration_(duration) {
   const ThreeByThree foundation = area.foundation(patch.stiffness);
   const double lead = ahead(rule) * duration;
-  response_ = (lead + patch.dissipation) * foundation;
-  response_[0][0] += damping;  // tipping and rolling are not damped
+  response_ = (lead + damping.staying * (duration - lead) + patch.dissipation) * foundation;
+  response_[0][0] += damping.factor;  // tipping and rolling are not damped
   // Backward Euler depends on the velocity at the end only. The other rule depends on the change of the velocity.
   const Three known = (rule == Rule::kKeeping ? lead : 0) * (foundation * before);
   rest_ = Three{patch.force, 0, 0} + known;
+  // The pressure aims at the speed of a bounce if this is more than what the depth gives back.
+  if (patch.restitution > 0 && damping.approach < -kImpact)
+    rest_[0] = std::max(patch.force, -patch.restitution * response_[0][0] * damping.approach);
   ThreeByThree matrix = duration * (response_ * mobility);
   for (int i = 0; i < 3; ++i) matrix[i][i] += 1;
   implicit_ = inverse(matrix);

@@ -13,9 +13,15 @@ enum class Rule { kKeeping, kDamping };
 /// centroid of the volume.
 class Pressure {
  public:
+  /// Damping of motion along the normal, besides the dissipation.
+  struct Damping {
+    double factor = 0;    ///< N s/m
+    double approach = 0;  ///< m/s: the slip at the beginning of the step that it sees, negative for an impact
+    double staying = 0;   ///< from 0 to 1: to which part tipping follows backward Euler. Rolling bodies have 0.
+  };
+
   /// `before` is the slip at the beginning of the step. `mobility` times pressures is the change of the slip in 1 s.
-  /// `damping` in N s/m resists motion along the normal, besides the dissipation.
-  Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, double damping,
+  Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, const Damping& damping,
            const Three& before, double duration, Rule rule);
 
   /// The pressures. `slip` is the slip at the end of the step without them. Pressures push, and their centre stays on

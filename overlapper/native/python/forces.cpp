@@ -113,7 +113,8 @@ std::vector<Patch> patches_of(const Overlaps& found, std::span<const std::option
 
 nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps& found, nb::handle links_given,
                  nb::handle stiffness_given, nb::handle dissipation_given, nb::handle friction_given,
-                 nb::handle damping_given, nb::handle tops_given) {
+                 nb::handle recovery_given, nb::handle restitution_given, nb::handle rolling_given,
+                 nb::handle spinning_given, nb::handle tops_given) {
   std::vector<Pose> frames;
   for (nb::handle each : frames_given) frames.push_back(to_pose(each));
   const size_t count = found.size(), links = size_t(solver.bodies().links());
@@ -122,8 +123,13 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
   const auto stiffness = numbers(stiffness_given, "stiffness", count);
   const auto dissipation = numbers(dissipation_given, "dissipation", count);
   const auto friction = numbers(friction_given, "friction", count);
-  std::vector<double> damping(count);
-  if (!damping_given.is_none()) damping = numbers(damping_given, "damping", count);
+  const auto optional = [&](nb::handle given, const char* name) {
+    return given.is_none() ? std::vector<double>(count) : numbers(given, name, count);
+  };
+  const auto recovery = optional(recovery_given, "recovery");
+  const auto restitution = optional(restitution_given, "restitution");
+  const auto rolling = optional(rolling_given, "rolling");
+  const auto spinning = optional(spinning_given, "spinning");
   std::vector<Vec3> tops(link_of.size());
   if (!tops_given.is_none()) tops = to_rows(tops_given, "tops");
   if (tops.size() != link_of.size()) fail("tops", "must have a row for each shape");
@@ -140,7 +146,8 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
     patch.link_a = int(link_of[a]), patch.link_b = int(link_of[b]);
     patch.normal = seen[i] ? seen[i]->normal : found.normal[i];
     patch.stiffness = stiffness[i], patch.dissipation = dissipation[i];
-    patch.damping = damping[i], patch.friction = friction[i];
+    patch.recovery = recovery[i], patch.restitution = restitution[i];
+    patch.friction = friction[i], patch.rolling = rolling[i], patch.spinning = spinning[i];
     if (found.status[i] != std::int8_t(Status::kOverlapping)) continue;
     patch.force = stiffness[i] * found.volume[i];
     patch.centroid = found.centroid[i];
@@ -267,18 +274,23 @@ numbers for the coordinates of its tree; w is the size of the largest tree.)");
       "Another one that knows the same of the last step: what it solves changes nothing here.");
   cls.def(
       "place", &place, "frames"_a, "overlaps"_a, "links"_a, "stiffness"_a, "dissipation"_a, "friction"_a,
-      "damping"_a.none() = nb::none(), "tops"_a.none() = nb::none(),
+      "recovery"_a.none() = nb::none(), "restitution"_a.none() = nb::none(), "rolling"_a.none() = nb::none(),
+      "spinning"_a.none() = nb::none(), "tops"_a.none() = nb::none(),
       nb::sig(
           "def place(self, frames: collections.abc.Sequence[typing.Any], overlaps: Overlaps, links: "
           "numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: "
-          "numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike, damping: numpy.typing.ArrayLike | None = None, "
+          "numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike, recovery: numpy.typing.ArrayLike | None = None, "
+          "restitution: numpy.typing.ArrayLike | None = None, rolling: numpy.typing.ArrayLike | None = None, "
+          "spinning: numpy.typing.ArrayLike | None = None, "
           "tops: numpy.typing.ArrayLike | None = None) "
           "-> numpy.typing.NDArray[numpy.float64]"),
       R"(Put the links where they are, and take what their shapes share; `links` (k,) is the place of each shape's link.
 
 `frames` begin with position and quaternion of the inertial frame, as pybullet's answers do. By row of `overlaps` (p,):
-stiffness in Pa/m, dissipation in s, the coefficient of friction, and the damping ratio along the normal, which is 0
-if it is not given. `tops` (k, 3) has the normal of the top of each prism of a height field, in the frame of the prism,
+stiffness in Pa/m, dissipation in s, and the coefficient of friction. The others are 0 if they are not given: `recovery`
+in s, by which pressures follow the mean motion of the two links along the normal besides the dissipation; `restitution`,
+the speed after an impact over the speed before, which needs a recovery; `rolling` and `spinning` in m, the torques
+against rolling and against spinning over the force. Friction on the area resists spinning besides. `tops` (k, 3) has the normal of the top of each prism of a height field, in the frame of the prism,
 and zeros for other shapes. A prism presses with its top alone, because its vertical walls are inside the field. The
 answer (p,) is the square of a frequency,
 (rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.)");

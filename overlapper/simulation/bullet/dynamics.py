@@ -19,7 +19,10 @@ from overlapper.simulation.model import BASE, Array
 
 # By kinematic_tree.Kind: the number that _core.ContactSolver knows it by, and how many coordinates it has.
 JOINTS = {"held": (0, 0), "planar": (0, 0), "revolute": (1, 1), "prismatic": (2, 1), "spherical": (3, 3)}
-MASS, FRICTION, INERTIA = 0, 1, 2  # of getDynamicsInfo
+MASS, FRICTION, INERTIA, RESTITUTION, ROLLING, SPINNING = 0, 1, 2, 5, 6, 7  # of getDynamicsInfo
+SURFACE = (FRICTION, RESTITUTION, ROLLING, SPINNING)
+MOST_TORQUE = 10.0  # m: Bullet takes no larger coefficients for the torques of two bodies
+G = 9.81  # m/s²: bodies have a weight by this acceleration if there is no gravity
 HELD = (-1, 0, np.zeros(3), np.zeros(3))  # a base: no parent, no joint
 
 Known = tuple[list[Any], _core.ContactSolver]
@@ -37,19 +40,20 @@ class BulletDynamics:
         self.links = [(id, link) for id, joints in self._joints.items() for link in (BASE, *joints)]
         self.place = {each: k for k, each in enumerate(self.links)}
         self._masses: list[Any] = [None]  # equals no real list of masses, so that the first `read` makes a solver
-        self._friction: Array = np.zeros(len(self.links))
+        self._surface: Array = np.zeros((len(self.links), len(SURFACE)))
         self.read()
 
     def read(self) -> bool:
         """Read masses and friction again. True if a mass or inertia has changed, so that there is a new solver."""
         told = [pybullet.getDynamicsInfo(id, link, self._client) for id, link in self.links]
-        self._friction = np.array([each[FRICTION] for each in told])
+        self._surface = np.array([[each[k] for k in SURFACE] for each in told]).reshape(-1, len(SURFACE))
         masses = [(each[MASS], each[INERTIA]) for each in told]
-        if masses == self._masses:
-            return False
-        self._masses = masses
-        self._model()
-        return True
+        changed = masses != self._masses
+        if changed:
+            self._masses = masses
+            self._model()
+        self._weights = (np.linalg.norm(self._gravity()) or G) * self._moved_masses()
+        return changed
 
     def known(self) -> Known:
         """The masses, and a solver that has the last forces."""
@@ -65,12 +69,37 @@ class BulletDynamics:
 
     def friction(self, pairs: NDArray[np.int64]) -> Array:
         """(p,) the products of the two links' lateralFriction."""
-        return np.asarray(self._friction[pairs].prod(axis=1))
+        return np.asarray(self._surface[pairs, 0].prod(axis=1))
+
+    def resistance(self, pairs: NDArray[np.int64]) -> dict[str, Array]:
+        """(p,) the products of the two links' restitution, and the rolling and spinning friction as in Bullet.
+
+        Bullet adds the products of the rolling friction of each link with the lateral friction of the other link.
+        """
+        sliding, restitution, *torques = np.moveaxis(self._surface[pairs], 2, 0)
+        rolling, spinning = (np.minimum((each * sliding[:, ::-1]).sum(axis=1), MOST_TORQUE) for each in torques)
+        return {"restitution": restitution.prod(axis=1), "rolling": rolling, "spinning": spinning}
+
+    def weights(self) -> Array:
+        """(n,) the weights of the links' bodies in N, 0 for bodies that nothing moves."""
+        return self._weights
+
+    def _moved_masses(self) -> Array:
+        """(n,) the masses of the links' bodies, 0 for bodies that forces do not move."""
+        jointed = {id for id, _, _ in (*self._single, *self._spherical)}
+        of_body = {}
+        for id, joints in self._joints.items():
+            masses = [self._masses[self.place[id, link]][MASS] for link in (BASE, *joints)]
+            of_body[id] = sum(masses) if masses[0] > 0 or id in jointed else 0.0
+        return np.array([of_body[id] for id, _ in self.links])
+
+    def _gravity(self) -> list[float]:
+        told = pybullet.getPhysicsEngineParameters(self._client)
+        return [told[f"gravityAcceleration{axis}"] for axis in "XYZ"]
 
     def other_forces(self) -> LearntForces:
         """Forces of which only gravity on free bases is known before any motion."""
-        told = pybullet.getPhysicsEngineParameters(self._client)
-        down = [told[f"gravityAcceleration{axis}"] for axis in "XYZ"]
+        down = self._gravity()
         found = np.zeros(self.solver.coordinates)
         for (id, _), first in self._bases.items():
             if self._masses[self.place[id, BASE]][MASS] > 0:

@@ -23,8 +23,10 @@ BISECTIONS = 8
 
 def coming(
     masses: Masses, frames: Sequence[Pose], now: Overlaps, duration: float, velocity: Array, among: Among
-) -> float:
-    """Return the square of the highest frequency (rad/s) of the overlaps that come within `duration` (s).
+) -> tuple[float, float]:
+    """Return the squares of two frequencies (rad/s): of all overlaps that come within `duration`, and of small bodies.
+
+    The first is the highest of the overlaps. The second is that of bodies which are swallowed within the duration (s).
 
     `frames` are the frames of the links. `now` are the overlaps in these frames. All coordinates are assumed to keep
     their `velocity`.
@@ -34,7 +36,7 @@ def coming(
     """
     # Bodies at rest bring no new contact.
     if np.abs(velocity).max(initial=0.0) * duration < STILL:
-        return 0.0
+        return 0.0, 0.0
     solver = masses.dynamics.solver.copy()
     highest = 0.0
     known: set[tuple[int, int]] | None = None
@@ -55,7 +57,7 @@ def coming(
         else:
             break
         part = (early + late) / 2
-    return max(highest, (2 / (late - early) / duration) ** 2) if lost else highest
+    return highest, (2 / (late - early) / duration) ** 2 if lost else 0.0
 
 
 def followed(frequency2: float, duration: float) -> int:

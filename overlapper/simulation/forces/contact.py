@@ -25,6 +25,12 @@ COARSE = 2.0
 # The most substeps of a step: contacts that are stiffer are damped.
 MOST_SUBSTEPS = 200
 
+# The most substeps if no dissipation is given, as nothing swings then.
+FEW_SUBSTEPS = 4
+
+# A mean depth of more than this share of the smaller body is worth a warning.
+DEEP = 0.2
+
 
 class VolumetricContact:
     """Contact forces from the volumes that bodies share, in place of the contact points of pybullet or MuJoCo.
@@ -41,21 +47,30 @@ class VolumetricContact:
         The bodies of a simulation.
     pairs : {'simulated', 'all'} or list of pairs, optional
         Pairs as in `Bodies.pairs`. Default: all pairs that the simulator lets collide.
-    stiffness : float or callable, default 1e7
+    stiffness : float or callable, optional
         Pressure for each metre of depth, Pa/m. A layer of thickness t and modulus E has the stiffness E / t. Two bodies
-        in series have 1 / (1 / k1 + 1 / k2).
+        in series have 1 / (1 / k1 + 1 / k2). Default: from masses, sizes and gravity, so that a ball rests less than a
+        thousandth of its diameter deep, even under ten times its weight. With a `dissipation`, the default is 1e7.
     dissipation : float or callable, optional
         Time in s by which pressures are ahead of the depth (Kelvin and Voigt). The damping ratio of an oscillation of
-        angular frequency w is w * dissipation / 2. A dissipation of 0 keeps the energy. Default: 0.001, and besides
-        critical damping of the motion along the normal of each patch. Bodies then hardly bounce, as in pybullet, where
-        restitution is 0 by default. This damping does not resist what rolls.
+        angular frequency w is w * dissipation / 2. A dissipation of 0 keeps the energy. Default: 0.001, and depths
+        recover within 0.02 s along the normal of each patch. Bodies then bounce by their `restitution` alone. This
+        damping does not resist what rolls.
     friction : float, callable or 'distributed', optional
         Coulomb's coefficient. Default: that of the simulator. In pybullet it is the product of the two links'
         lateralFriction, in MuJoCo the sliding friction of the two geoms. With "distributed", friction acts at points
         spread over the patch, with the simulator's coefficients. This is more exact where bodies slip and spin at once.
     substeps : int or 'auto', default 'auto'
         Number of parts of a step of the simulator. 'auto': it follows from the stiffness and the masses, anew in every
-        step.
+        step. Without a `dissipation`, it is 4 at most, or more for small bodies that would pass through others.
+    restitution : float or callable, optional
+        The speed after an impact over the speed before it. Slower impacts than 0.2 m/s have none. Default: that of the
+        simulator. In pybullet it is the product of the two links' restitution, which is 0 unless it is set. In MuJoCo
+        it is 0. It must not be given with `dissipation`.
+    rolling : float or callable, optional
+        The largest torque against rolling over the force, m. Default: that of the simulator. In pybullet it is the
+        rollingFriction of each link times the lateralFriction of the other link, added. In MuJoCo it is the rolling
+        friction of contacts of dimension 6.
 
     Raises
     ------
@@ -79,13 +94,14 @@ class VolumetricContact:
     The arguments are two (body, link), in MuJoCo two (body, geom). The function is called once for each pair.
 
     A patch resists slip and spin together: its force and torque stay within an ellipsoid. Sticking bodies do not creep.
-    Restitution, rolling and spinning friction of the simulator are not used.
+    The simulator's spinning friction adds to the torque of the patch.
 
     The solver ends after 10,000 visits of pairs, or ten sweeps over all. `residual` tells how accurate the forces are.
     Above 1e-3 there is one UnsettledWarning.
 
-    If there are too few substeps, each pair gives one SubstepsWarning. The contacts of such pairs are then solved by
-    backward Euler, which loses energy.
+    If there are too few substeps for a `dissipation`, each pair gives one SubstepsWarning. The contacts of such pairs
+    are then solved by backward Euler, which loses energy. A pair that stays deeper than a fifth of its smaller body for
+    0.1 s gives one DepthWarning.
 
     Within the `with`, the simulator does not respond to these pairs, whether they touch or not. It has no contact
     points of them. It simulates everything else: joints, motors, constraints and, in pybullet, other pairs.
@@ -124,10 +140,12 @@ class VolumetricContact:
         self,
         bodies: AnyBodies,
         pairs: Among | None = None,
-        stiffness: float | OfPair = 1e7,
+        stiffness: float | OfPair | None = None,
         dissipation: float | OfPair | None = None,
         friction: float | OfPair | Literal["distributed"] | None = None,
         substeps: int | Literal["auto"] = "auto",
+        restitution: float | OfPair | None = None,
+        rolling: float | OfPair | None = None,
     ) -> None:
         if not isinstance(bodies, AnyBodies):
             raise TypeError(f"bodies must be the Bodies of a simulation, not {bodies!r}")
@@ -136,7 +154,7 @@ class VolumetricContact:
         self._among: Among = among if isinstance(among, str) else listed(among)
         bodies.update()
         bodies.link_pairs(self._among)  # says what is wrong with them
-        self._layers = Layers(stiffness, dissipation, friction)
+        self._layers = Layers(stiffness, dissipation, friction, restitution, rolling)
         whole = isinstance(substeps, (int, np.integer)) and not isinstance(substeps, bool)
         if substeps != "auto" and not (whole and int(substeps) >= 1):
             raise ValueError(f"substeps must be a whole number from 1, or 'auto', not {substeps!r}")
@@ -198,9 +216,10 @@ class VolumetricContact:
                 frequency2 = self._place(lost)
                 if not self._planned:
                     # Once in a step is enough for what comes; a length that changes within a swing costs energy.
-                    highest = max(frequency2.max(initial=0.0), 0.0 if taken else self._coming(duration, velocity))
+                    coming, swallowed = (0.0, 0.0) if taken else self._coming(duration, velocity)
+                    highest = max(frequency2.max(initial=0.0), coming, swallowed)
                     if not taken or highest * length**2 > 1:
-                        length = left / min(followed(highest, left), max(1, MOST_SUBSTEPS - taken))
+                        length = left / self._needed(highest, swallowed, left, taken)
                 wrenches = self._solve(length, velocity, frequency2)
                 self._mechanics.begin(length, duration, first=not taken)
                 self._masses.dynamics.apply(wrenches, self._frames)
@@ -217,8 +236,8 @@ class VolumetricContact:
     def forces(self) -> Forces:
         """The forces at the beginning of a step, without taking the step.
 
-        It is meant for scripts that integrate by themselves. Such scripts should give a dissipation. The default
-        damping is too strong for an explicit step of the whole length.
+        It is meant for scripts that integrate by themselves. Such scripts should give a dissipation and a stiffness.
+        The default contact is too stiff for an explicit step of the whole length.
 
         Returns
         -------
@@ -230,7 +249,7 @@ class VolumetricContact:
         velocity, lost = self._velocity()
         frequency2 = self._place(lost)
         duration = self.bodies.time_step
-        substeps = self._planned or min(followed(frequency2.max(initial=0.0), duration), MOST_SUBSTEPS)
+        substeps = self._planned or self._needed(frequency2.max(initial=0.0), 0.0, duration, 0)
         self._solve(duration / substeps, velocity, frequency2)
         return self._found
 
@@ -438,15 +457,25 @@ class VolumetricContact:
         frequency2, self._stiffness = self._masses.place(solver, self._frames, self._contacts.overlaps)
         return frequency2
 
-    def _coming(self, duration: float, velocity: Array) -> float:
-        """Return the square of the highest frequency of the overlaps that come within the duration."""
+    def _needed(self, highest: float, swallowed: float, left: float, taken: int) -> int:
+        """Return the number of substeps for the time (s) that is `left`, after those that are `taken`.
+
+        `highest` and `swallowed` are squares of frequencies, of everything and of bodies that are swallowed.
+        """
+        most = max(1, MOST_SUBSTEPS - taken)
+        if self._layers.recovers:
+            most = max(1, FEW_SUBSTEPS - taken, min(followed(swallowed, left), most))
+        return min(followed(highest, left), most)
+
+    def _coming(self, duration: float, velocity: Array) -> tuple[float, float]:
+        """Return the squares of frequencies of the overlaps that come within the duration. See `coming`."""
         ahead = self._others.ahead(velocity, duration)
         return coming(self._masses, self._frames, self._contacts.overlaps, duration, ahead, self._among)
 
     def _solve(self, duration: float, velocity: Array, frequency2: Array, whole: bool = False) -> Array:
         """Return (n, 6) force and torque on the links, in a substep of this duration or in a `whole` step."""
         other = self._others.learnt(velocity)
-        damped = frequency2 * duration**2 > COARSE**2
+        damped = (frequency2 * duration**2 > COARSE**2) & (not self._layers.recovers)
         if damped.any():
             planned = 1 if whole else self._planned or MOST_SUBSTEPS
             self._told.of_substeps(self._contacts, damped, frequency2, duration, planned)
@@ -464,7 +493,16 @@ class VolumetricContact:
             self._contacts, force, torque, slip, normal, directed, self._stiffness, self._frame, residual
         )
         self._told.of_residual(residual, self.sweeps)
+        self._told.of_depth(self._contacts, *self._deep(), duration)
         if not directed.all():
             self._told.of_direction(self._contacts, ~directed)
         self._others.solved(velocity, duration, ours)
         return wrenches
+
+    def _deep(self) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Return by row: whether bodies are deep in each other, mean depths, and the sizes of the smaller bodies."""
+        found = self._contacts.overlaps
+        area = np.linalg.norm(self._masses.areas(found), axis=1)
+        sizes = self._masses.size(found)
+        deep = self._found.directed & (found.volume > DEEP * sizes * area)
+        return deep, found.volume / np.where(deep, area, 1.0), sizes

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from overlapper import Batch, Overlaps
+from overlapper import Batch, Overlaps, Shape
 from overlapper._core import ContactSolver
 from overlapper.quaternion import rotated
 from overlapper.simulation.asked_pairs import Among
@@ -29,6 +30,7 @@ class Masses:
         self.dynamics = mechanics.dynamics(sorted({body for body, _, _ in self.keys}))
         self._links = np.array([self.dynamics.place[body, link] for body, link, _ in self.keys], dtype=np.int64)
         self._tops = bodies.tops
+        self.sizes = _sizes(bodies.shapes, self._links, self._tops, len(self.dynamics.links))
         self._batch = Batch(bodies.shapes)  # for what is not yet: the one of `bodies` knows what is
 
     def are_stale(self) -> bool:
@@ -36,7 +38,11 @@ class Masses:
 
     def stiffness(self, found: Overlaps) -> Array:
         """(p,) the stiffness of each row in Pa/m."""
-        return self._layers.of(self._links[found.pairs], self.dynamics)[0]
+        return self._laws(found)["stiffness"]
+
+    def size(self, found: Overlaps) -> Array:
+        """(p,) the size of the smaller link of each row, in m: the diameter of a ball of its volume."""
+        return np.asarray(self.sizes[self._links[found.pairs]].min(axis=1))
 
     def areas(self, found: Overlaps) -> Array:
         """(p, 3) the area vectors of the patches, m², from the second to the first, at the poses now.
@@ -60,8 +66,11 @@ class Masses:
 
         Returns by row the squares of frequencies (rad²/s²) and the stiffness (Pa/m).
         """
-        layers = self._layers.of(self._links[found.pairs], self.dynamics)
-        return solver.place(frames, found, self._links, *layers, tops=self._tops), layers[0]
+        laws = self._laws(found)
+        return solver.place(frames, found, self._links, **laws, tops=self._tops), laws["stiffness"]
+
+    def _laws(self, found: Overlaps) -> dict[str, Array]:
+        return self._layers.of(self._links[found.pairs], self.dynamics, self.sizes)
 
     def velocity(self) -> tuple[Array, set[int]]:
         """Return the velocities of all coordinates and the bodies that are lost.
@@ -88,3 +97,13 @@ class Masses:
         )
         pairs = bodies.pairs_at(positions, orientations, among)
         return self._batch.overlaps(positions, orientations, pairs, separated=False)
+
+
+def _sizes(shapes: Sequence[Shape], links: NDArray[np.int64], tops: Array | None, count: int) -> Array:
+    """(count,) the diameters of balls with the volumes of the links, in m; infinite for planes and height fields."""
+    volumes = np.array([shape.volume for shape in shapes], dtype=float)
+    if tops is not None:
+        volumes[tops.any(axis=1)] = np.inf
+    found = np.zeros(count)
+    np.add.at(found, links, volumes)
+    return np.asarray(np.cbrt(6 / np.pi * found))

@@ -15,39 +15,77 @@ from overlapper.simulation.model import Array, LinkKey
 OfPair = Callable[[LinkKey, LinkKey], float]
 """The value for a pair of links ((body, link), (body, link)), the lesser first."""
 
-# If no dissipation is given: it resists what rolls by little, and motion along the normal is damped besides.
-DISSIPATION, DAMPING = 1e-3, 1.0
+# If no dissipation is given, in s: it resists what rolls by little. Depths recover within the second time.
+DISSIPATION, RECOVERY = 1e-3, 0.02
+
+# In N: bodies without a weight, which forces do not move, count as bodies of this weight.
+LIGHTEST = 1e-3
+
+# If no stiffness is given, but a dissipation: in Pa/m, soft enough to follow each swing.
+STIFFNESS = 1e7
+
+# If neither is given: a ball with this many times the weight of the heavier body rests at this share of its
+# diameter.
+LOAD, SHARE = 10.0, 1e-3
 
 
 class Layers:
-    """The elastic layers of the bodies: stiffness, dissipation and friction, as `VolumetricContact` takes them.
+    """The elastic layers of the bodies: the laws of contact, as `VolumetricContact` takes them.
 
     With `distributed` friction, the coefficients are those of the simulator.
     """
 
     def __init__(
         self,
-        stiffness: float | OfPair,
+        stiffness: float | OfPair | None,
         dissipation: float | OfPair | None,
         friction: float | OfPair | Literal["distributed"] | None,
+        restitution: float | OfPair | None,
+        rolling: float | OfPair | None,
     ) -> None:
         self.distributed = isinstance(friction, str) and friction == "distributed"
-        self._stiffness = Parameter("stiffness", stiffness, "Pa/m", positive=True)
+        self.recovers = dissipation is None
+        if restitution is not None and not self.recovers:
+            raise ValueError("restitution must not be given with dissipation, which determines how bodies bounce")
         self._dissipation = Parameter("dissipation", DISSIPATION if dissipation is None else dissipation, "s")
-        self._damping = DAMPING if dissipation is None else 0.0
-        self._friction = None
-        if friction is not None and not self.distributed:
-            self._friction = Parameter("friction", friction, "")  # type: ignore[arg-type]  # no other text is a number
+        if stiffness is None and not self.recovers:
+            stiffness = STIFFNESS
+        # Values that are not given are those of the simulator, or follow from masses and sizes.
+        given = {"stiffness": stiffness, "friction": None if self.distributed else friction}
+        given |= {"restitution": restitution, "rolling": rolling}
+        units = {"stiffness": "Pa/m", "rolling": "m"}
+        self._given = {
+            name: Parameter(name, value, units.get(name, ""), positive=name == "stiffness")  # type: ignore[arg-type]
+            for name, value in given.items()
+            if value is not None
+        }
 
-    def of(self, pairs: NDArray[np.int64], dynamics: Dynamics) -> tuple[Array, Array, Array, Array]:
-        """Return stiffness, dissipation, coefficient of friction and damping ratio along the normal, each (p,).
+    def of(self, pairs: NDArray[np.int64], dynamics: Dynamics, sizes: Array) -> dict[str, Array]:
+        """Return the laws of each pair (p,), by the names of the arguments of `ContactSolver.place`.
 
-        `pairs` (p, 2) are pairs of indices in `dynamics.links`.
+        `pairs` (p, 2) are pairs of indices in `dynamics.links`. `sizes` (n,) in m are those of the links.
         """
-        links = dynamics.links
-        friction = self._friction.of(pairs, links) if self._friction else dynamics.friction(pairs)
-        damping = np.full(len(pairs), self._damping)
-        return self._stiffness.of(pairs, links), self._dissipation.of(pairs, links), friction, damping
+        found = {name: each.of(pairs, dynamics.links) for name, each in self._given.items()}
+        if "stiffness" not in found:
+            found["stiffness"] = resting_stiffness(dynamics.weights()[pairs].max(axis=1), sizes[pairs].min(axis=1))
+        if "friction" not in found:
+            found["friction"] = dynamics.friction(pairs)
+        simulated = dynamics.resistance(pairs)
+        found = simulated | found
+        if not self.recovers:
+            del found["restitution"]
+        found["recovery"] = np.full(len(pairs), RECOVERY if self.recovers else 0.0)
+        found["dissipation"] = self._dissipation.of(pairs, dynamics.links)
+        return found
+
+
+def resting_stiffness(weights: Array, sizes: Array) -> Array:
+    """Return the stiffness in Pa/m at which balls of these diameters (m) rest `SHARE` of them deep.
+
+    Each ball bears `LOAD` times its weight (N).
+    """
+    volumes = np.pi / 2 * SHARE**2 * sizes**3  # of a shallow cap of a ball
+    return np.asarray(LOAD * np.maximum(weights, LIGHTEST) / np.where(np.isfinite(volumes), volumes, 1.0))
 
 
 class Parameter:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.cautions import (
+    DepthWarning,
     NoDirectionWarning,
     NoStepWarning,
     SkippedShapeWarning,
@@ -19,6 +20,9 @@ from overlapper.simulation.cautions import (
 )
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.model import Array, LinkKey
+
+# A contact that stays deep for longer, in s, is worth a warning.
+LASTING = 0.1
 
 # A larger residual of the solver is worth a warning.
 SETTLED = 1e-3
@@ -37,6 +41,7 @@ class Told:
         self._known: set[tuple[type[Warning], LinkKey, LinkKey]] = set()
         self._lost: set[int] = set()
         self._unsettled = False
+        self._deep: dict[tuple[int, ...], float] = {}  # for how long
 
     def of_substeps(
         self, contacts: Contacts, damped: NDArray[np.bool_], frequency2: Array, duration: float, substeps: int
@@ -49,6 +54,25 @@ class Told:
                 f"{substeps} substeps are too few for the stiffness between {a} and {b}, which oscillate at up to "
                 f"{frequency:.0f} rad/s: with fewer than {needed} substeps, their contact loses energy",
                 SubstepsWarning,
+                stacklevel=4 + self.further,
+            )
+
+    def of_depth(
+        self, contacts: Contacts, deep: NDArray[np.bool_], depths: Array, sizes: Array, duration: float
+    ) -> None:
+        """Warn of rows that stay `deep`, with their mean depths and the sizes of their smaller links in m.
+
+        `duration` (s) is that of the substep.
+        """
+        keys = [tuple(contacts.keys[row].tolist()) for row in np.flatnonzero(deep).tolist()]
+        self._deep = {key: self._deep.get(key, 0.0) + duration for key in keys}
+        stays = deep.copy()
+        stays[deep] = [self._deep[key] > LASTING for key in keys]
+        for row, a, b in self._new(DepthWarning, contacts, stays):
+            warnings.warn(
+                f"{a} and {b} stay {depths[row]:.2g} m deep in each other on average, and the smaller one measures "
+                f"{sizes[row]:.2g} m: the stiffness is too small for their force",
+                DepthWarning,
                 stacklevel=4 + self.further,
             )
 

@@ -17,6 +17,7 @@ from overlapper.simulation.mujoco.friction import friction
 from overlapper.simulation.mujoco.geoms import collidable
 from overlapper.simulation.mujoco.mocap import COORDINATES, MocapMotion
 
+G = 9.81  # m/s²: bodies have a weight by this acceleration if there is no gravity
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 NOT_IMPLICIT = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
 
@@ -74,7 +75,18 @@ class MujocoDynamics:
 
     def friction(self, pairs: NDArray[np.int64]) -> Array:
         first, second = self._geoms[pairs].T
-        return friction(self._model, first, second)
+        return friction(self._model, first, second)[:, 0]
+
+    def resistance(self, pairs: NDArray[np.int64]) -> dict[str, Array]:
+        _, spinning, rolling = friction(self._model, *self._geoms[pairs].T).T
+        return {"restitution": np.zeros(len(pairs)), "rolling": rolling, "spinning": spinning}
+
+    def weights(self) -> Array:
+        model = self._model
+        trees = model.body_treeid
+        masses = np.bincount(trees + 1, model.body_mass, model.ntree + 1)
+        masses[0] = 0  # of bodies that do not move
+        return np.asarray((np.linalg.norm(model.opt.gravity) or G) * masses[trees[self._bodies] + 1])
 
     def other_forces(self) -> KnownForces:
         return KnownForces(self)

@@ -27,31 +27,31 @@ def cube_as_a_tree():
     return solver
 
 
-def placed(depth, dissipation=0.0, friction=0.0, solver=None, damping=None):
+def placed(depth, dissipation=0.0, friction=0.0, solver=None, **laws):
     """A cube that has sunk into a half-space, and the squares of frequencies."""
     solver = solver or solver_of(HELD, FREE)
     poses = [(0, 0, 0), (0, 0, HALF - depth)]
     found = overlaps([HalfSpace([0, 0, 1], 0), Box([HALF] * 3)], poses, [TURN] * 2, [(0, 1)])
     frames = [(pose, TURN) for pose in poses]
     links = np.array([0, 1])
-    return solver, solver.place(frames, found, links, [STIFFNESS], [dissipation], [friction], damping)
+    return solver, solver.place(frames, found, links, [STIFFNESS], [dissipation], [friction], **laws)
 
 
-@pytest.mark.parametrize("damping", [None, 0.7])
+@pytest.mark.parametrize("recovery", [0.0, 0.02])
 @pytest.mark.parametrize("dissipation", [0.0, 2e-3])
 @pytest.mark.parametrize("damped", [False, True])
 @pytest.mark.parametrize("approach", [-0.02, 0.0, 0.3])
-def test_the_pressure_at_the_end_of_a_step_is_that_of_the_velocity_there(damped, dissipation, approach, damping):
+def test_the_pressure_at_the_end_of_a_step_is_that_of_the_velocity_there(damped, dissipation, approach, recovery):
     """f = k V + k A (θ h (u' - u) + τ u'), or with backward Euler k V + k A (h + τ) u', of u' = u + h (g - f / m).
 
-    A damping ratio ζ along the normal adds 2 ζ / sqrt(k A / m) to τ.
+    The time of recovery adds to τ.
     """
     h, depth, area = 1 / 240, 1e-4, 4 * HALF**2
-    solver, _ = placed(depth, dissipation, damping=None if damping is None else [damping])
+    solver, _ = placed(depth, dissipation, recovery=[recovery])
     velocity, weight = np.zeros(12), np.zeros(12)
     velocity[8], weight[8] = -approach, -G
     force, *_, wrenches, ours, _sweeps, _residual = solver.solve(h, velocity, weight, np.array([damped]), False)
-    lag = (h if damped else h / 4) + dissipation + 2 * (damping or 0) / np.sqrt(STIFFNESS * area)
+    lag = (h if damped else h / 4) + dissipation + recovery
     ahead = lag * (approach + h * G) - (0 if damped else h / 4 * approach)
     expected = max(0, STIFFNESS * area * (depth + ahead) / (1 + STIFFNESS * area * h * lag))
     # A half-space is pushed by the opposite.
@@ -60,12 +60,12 @@ def test_the_pressure_at_the_end_of_a_step_is_that_of_the_velocity_there(damped,
     assert ours[8] == pytest.approx(expected, rel=1e-12, abs=1e-12) and not ours[:6].any()
 
 
-def test_damping_along_the_normal_does_not_resist_what_tips_or_rolls():
+def test_a_recovery_along_the_normal_does_not_resist_what_tips_or_rolls():
     velocity = np.zeros(12)
     velocity[9] = 0.1
     found = []
-    for damping in ([0.0], [1.0]):
-        solver, _ = placed(1e-4, dissipation=1e-3, damping=damping)
+    for recovery in ([0.0], [0.02]):
+        solver, _ = placed(1e-4, dissipation=1e-3, recovery=recovery)
         found.append(solver.solve(1 / 240, velocity, np.zeros(12), np.array([False]), False)[5][1, 3:])
     assert found[0][0] < 0 and found[0] == pytest.approx(found[1], rel=1e-12, abs=1e-12)
 
@@ -201,7 +201,10 @@ def test_invalid_links_are_refused(wrong, said):
         ({"stiffness": []}, "stiffness must have 1 numbers, not 0"),
         ({"dissipation": [1, 2]}, "dissipation must have 1 numbers, not 2"),
         ({"friction": [[1, 2]]}, "friction must have 1 numbers, not 2"),
-        ({"damping": [1, 2]}, "damping must have 1 numbers, not 2"),
+        ({"recovery": [1, 2]}, "recovery must have 1 numbers, not 2"),
+        ({"restitution": [1, 2]}, "restitution must have 1 numbers, not 2"),
+        ({"rolling": [1, 2]}, "rolling must have 1 numbers, not 2"),
+        ({"spinning": [1, 2]}, "spinning must have 1 numbers, not 2"),
     ],
 )
 def test_invalid_places_are_refused(wrong, said):
