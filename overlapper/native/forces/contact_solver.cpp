@@ -305,12 +305,16 @@ ContactSolver::Drift ContactSolver::drift(size_t patch, const Step& step, std::s
   return {rows_[patch].local({along, twist[0] - twist[1]}).tangential, stays};
 }
 
-Pressure::Damping ContactSolver::damping(size_t patch, std::span<const Six> before, double staying) const {
+Pressure::Damping ContactSolver::damping(size_t patch, std::span<const Six> before,
+                                         std::span<const Drift> drifts) const {
   const Row& row = rows_[patch];
   if (!(row.damping > 0)) return {};
-  double approach = before[patch].normal[0];
-  for (const auto [other, part] : row.damped_with)
+  // The patches of two links have the same numbers, so that parts of a body, and prisms below it, act as a whole.
+  double approach = before[patch].normal[0], staying = drifts[patch].staying;
+  for (const auto [other, part] : row.damped_with) {
     approach += part / row.damping * (before[other].normal[0] - before[patch].normal[0]);
+    staying += part / row.damping * (drifts[other].staying - drifts[patch].staying);
+  }
   return {row.damping, approach, staying};
 }
 
@@ -386,19 +390,20 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   laws.reserve(count);
   double largest = 0;
   std::vector<Six> before;
+  std::vector<Drift> drifts;
   for (const Row& row : rows_) before.push_back(slip_of(row, step.velocity));
+  for (size_t i = 0; i < rows_.size(); ++i) drifts.push_back(drift(i, step, ahead));
   for (int i = 0; i < count; ++i) {
     const ElasticPatch& patch = patches_[i];
     const Row& row = rows_[i];
     const Six free = slip_of(row, velocity);
     largest = std::max({largest, std::abs(free.normal[0]), std::abs(free.tangential[0]), std::abs(free.tangential[1])});
     const Rule rule = step.damped[i] ? Rule::kDamping : Rule::kKeeping;
-    const Drift drifts = drift(i, step, ahead);
-    const Pressure::Damping damped = damping(i, before, drifts.staying);
+    const Pressure::Damping damped = damping(i, before, drifts);
     laws.push_back({{patch, row.area, row.normal_by_normal, damped, before[i].normal, h, rule},
                     {patch, row.area, h * row.tangential_by_tangential, step.friction},
                     known_wrench(i),
-                    drifts});
+                    drifts[i]});
     laws[i].wrench.tangential = laws[i].friction.begin(laws[i].wrench.tangential);
   }
   for (int i = 0; i < count; ++i) push(rows_[i], laws[i].wrench, h, velocity);

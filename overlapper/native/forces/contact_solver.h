@@ -132,7 +132,7 @@ class ContactSolver {
   Six known_wrench(size_t patch) const;
   double staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const;
   Drift drift(size_t patch, const Step& step, std::span<const MovedOn> ahead) const;
-  Pressure::Damping damping(size_t patch, std::span<const Six> before, double staying) const;
+  Pressure::Damping damping(size_t patch, std::span<const Six> before, std::span<const Drift> drifts) const;
   void roll(size_t patch, Laws& laws, double duration, const Three& slip) const;
   double visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const;
   void extrapolate(Momentum& momentum, std::span<Laws> laws, double duration, std::span<double> velocity) const;
