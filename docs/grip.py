@@ -4,6 +4,7 @@ python docs/grip.py
 """
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from photograph import ROOT, photograph
@@ -19,7 +20,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder, "franka_grasp.html")
         with recorder(page, []) as record:
-            for frame in run(load_scene(str(ROOT / "scenes" / "franka_grasp.py")), contact="volumetric"):
+            scene = load_scene(str(ROOT / "scenes" / "franka_grasp.py"))
+            scene = replace(
+                scene, contact="volumetric", volumetric={"stiffness": 1e7}
+            )  # soft, so that overlaps are seen
+            for frame in run(scene):
                 record(frame)
         photograph(f"{page.as_uri()}#{LOOK}", ROOT / "docs" / "grip.png")
 

@@ -20,7 +20,7 @@ place, turn = p.getLinkState(robot, GRASP_TARGET)[:2]
 tilted = p.multiplyTransforms([0, 0, 0], turn, [0, 0, 0], p.getQuaternionFromEuler([0, 0.6, 0]))[1]
 bar = p.createMultiBody(0.3, shape, -1, place, tilted)
 
-with VolumetricContact(Bodies(), friction=1) as contact:
+with VolumetricContact(Bodies(), stiffness=1e8, friction=1) as contact:  # Pa/m, as a soft pad
     for joint, angle in [*ARM.items(), *((finger, 0.0) for finger in FINGERS)]:
         p.setJointMotorControl2(robot, joint, p.POSITION_CONTROL, angle, force=20 if joint in FINGERS else 200)
     for _ in range(240):
