@@ -1,5 +1,6 @@
 """The scenes do what their docstrings promise. `pytest scenes` tests that they are as recorded."""
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -110,7 +111,7 @@ def test_friction_alone_holds_the_duck_in_the_air_for_ten_seconds():
     assert np.abs(velocity[duck]).max() < 1e-5
     assert {body for row in frame.forces.pairs[:, [0, 3]].tolist() for body in row} == {duck, arm}
     grips = [np.linalg.norm(frame.forces.on(arm, finger)[0]) for finger in (left, right)]
-    assert grips == pytest.approx([20, 20], rel=0.02)
+    assert grips == pytest.approx([20, 20], rel=0.03)
     assert frame.forces.on(duck)[0] == pytest.approx([0, 0, weight], abs=1e-3 * weight)
 
 
@@ -135,7 +136,9 @@ def test_a_cube_that_rattles_on_contact_points_rests_on_what_it_shares():
 
 
 def test_a_peg_that_leans_is_pushed_back_by_every_wall():
-    *_, frame = run(scene("peg_in_hole"), contact="volumetric")
+    *_, frame = run(
+        replace(scene("peg_in_hole"), volumetric={"stiffness": 1e7, "dissipation": 1e-3}), contact="volumetric"
+    )
     assert len(frame.forces) == 8
     pushed = np.linalg.norm(frame.forces.force, axis=1)
     assert 0.01 < pushed.min() < pushed.max() < 5  # N: two tenths of a millimetre on a few square centimetres
