@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from heapq import heappop, heappush
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -183,7 +184,9 @@ def maximum_volume(
 
 
 def checked_tolerance(given: float) -> float:
-    """The tolerance. ValueError unless it lies between 0 and 1."""
+    """The tolerance. ValueError unless it is a number between 0 and 1."""
+    if not isinstance(given, Real):
+        raise ValueError("tolerance must be a number")
     if not 0 < given < 1:
         raise ValueError(f"tolerance must be greater than 0 and less than 1, not {given!r}")
     return float(given)

@@ -158,6 +158,7 @@ def test_enlarged_bodies_contain_balls_about_their_points(shape, by):
     [
         ({"tolerance": 0}, "tolerance must be greater than 0 and less than 1"),
         ({"tolerance": 1}, "tolerance must be greater than 0 and less than 1"),
+        ({"tolerance": "1e-3"}, "tolerance must be a number"),
         ({"duration": 0}, "duration must be greater than 0"),
         ({"motion_a": (1, 2, 3)}, "motion_a must be a pair"),
         ({"a": HalfSpace([0, 0, 1], 0), "b": HalfSpace([0, 0, -1], -1)}, "a and b must not both be half-spaces"),

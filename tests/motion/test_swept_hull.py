@@ -117,6 +117,7 @@ def test_a_thin_rod_in_any_direction():
         ({"motion": (1, 2, 3)}, "motion must be a pair"),
         ({"motion": ((0, 0, np.inf), (0, 0, 0))}, "motion must be finite"),
         ({"tolerance": 2}, "tolerance must be greater than 0 and less than 1"),
+        ({"tolerance": "1e-2"}, "tolerance must be a number"),
     ],
 )
 def test_refused_arguments(arguments, words):
