@@ -183,7 +183,7 @@ def disagreement(found: Overlap) -> str:
 def test_measured_intervals_contain_the_proved_bounds(first, second, turns):
     rng = np.random.default_rng([11, *map(ord, first + second + turns)])
     wrong = {}
-    for _ in range(3):
+    for _ in range(2):
         a, b = sunk(rng, first, second, turns)
         found = overlap(a, b)
         if found:
@@ -192,7 +192,7 @@ def test_measured_intervals_contain_the_proved_bounds(first, second, turns):
 
 
 @pytest.mark.parametrize("first", ROUND)
-@pytest.mark.parametrize("larger", [1e-3, 30.0, 1e3])
+@pytest.mark.parametrize("larger", [1e-3, 1e3])
 def test_neither_size_nor_place_costs_digits(first, larger):
     rng = np.random.default_rng([13, *map(ord, first), int(larger)])
     wrong = {}
@@ -212,7 +212,7 @@ LOWEST = {
 }
 
 
-@pytest.mark.parametrize("depth", [0.2, 0.08, 1e-3, 1e-8])
+@pytest.mark.parametrize("depth", [0.2, 1e-3, 1e-8])
 @pytest.mark.parametrize(("lower", "upper"), [*combinations_with_replacement(LOWEST, 2)])
 def test_rounded_bodies_meet_at_facets_edges_and_corners(lower, upper, depth):
     rng = np.random.default_rng([17, *map(ord, lower + upper)])

@@ -165,7 +165,7 @@ def test_mean_distances_are_those_of_points_of_the_floor_inside_the_body(body):
             height = reach * (1 - sunk)
             answer = overlap(Placed(shape, (1, 2, height), turned), FLOOR)
             centroid = answer.centroid[:2] - [1, 2]
-            grid = np.stack(np.meshgrid(*2 * [(np.arange(1000) + 0.5) / 500 - 1], [-height]), axis=-1).reshape(-1, 3)
+            grid = np.stack(np.meshgrid(*2 * [(np.arange(600) + 0.5) / 300 - 1], [-height]), axis=-1).reshape(-1, 3)
             points = grid[inside(grid @ rotation(turned))][:, :2]
             truth = np.linalg.norm(points - centroid, axis=1).mean()
             assert answer.patch_distance == pytest.approx(truth, rel=off)
