@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "batch/box_volumes.h"
 #include "batch/parallel.h"
 #include "overlap/overlap.h"
 #include "overlap/second_derivatives.h"
@@ -32,56 +33,16 @@ std::vector<Placed> raised(std::span<const Placed> rows) {
   return boxes;
 }
 
-/// The rows of two arrays, ready to be paired.
+/// The rows of two arrays, ready to overlap.
 struct RowsOfPairs {
   std::vector<Placed> higher;
   std::span<const Placed> a, b;
 
-  RowsOfPairs(const ShapeArray& first, const ShapeArray& second, bool to_overlap) : a(first.rows), b(second.rows) {
-    if (to_overlap && second.planar) higher = raised(second.rows), b = higher;
+  RowsOfPairs(const ShapeArray& first, const ShapeArray& second) : a(first.rows), b(second.rows) {
+    if (second.planar) higher = raised(second.rows), b = higher;
   }
   RowsOfPairs(const RowsOfPairs&) = delete;
 };
-
-}  // namespace
-
-double common_volume(const Placed& a, const Placed& b, double tolerance) {
-  if (const std::optional<Measures> at_once = measure_at_once(a, b)) {
-    if (at_once->status == Status::kSeparated) return 0;
-    if (at_once->measured) return at_once->volume;
-  }
-  return Overlap(a, b, tolerance, Method::kAuto).volume();
-}
-
-double volume_around(const Placed& a, const Placed& b) {
-  std::vector<Vec3> corners;
-  for (const Placed* box : {&a, &b})
-    for (int i = 0; i < 8; ++i) corners.push_back(box->pose * vertex(box->shape, i));
-  return make_hull(corners).volume();
-}
-
-bool for_pairs(const ShapeArray& a, const ShapeArray& b, Pairing pairing, bool culled, int threads,
-               const PairValue& value, std::span<double> values) {
-  const RowsOfPairs rows(a, b, culled);
-  if (pairing == Pairing::kRows || !culled) {
-    const size_t columns = pairing == Pairing::kRows ? 1 : b.size();
-    return for_each_in_parallel(values.size(), threads, [&](size_t k, int) {
-      values[k] = value(rows.a[k / columns], rows.b[pairing == Pairing::kRows ? k : k % columns]);
-      return true;
-    });
-  }
-  std::ranges::fill(values, 0);
-  const std::vector<IndexPair> pairs = pairs_that_meet(rows.a, rows.b);
-  return for_each_in_parallel(pairs.size(), threads, [&](size_t k, int) {
-    const auto [i, j] = pairs[k];
-    values[i * b.size() + j] = value(rows.a[i], rows.b[j]);
-    return true;
-  });
-}
-
-namespace {
-
-constexpr size_t kStretch = 1 << 14;  // pairs whose derivatives are kept until they are summed in order
 
 /// The pairs of two arrays, and the place of each among the weights.
 std::vector<IndexPair> pairs_of(const RowsOfPairs& rows, Pairing pairing) {
@@ -93,6 +54,66 @@ std::vector<IndexPair> pairs_of(const RowsOfPairs& rows, Pairing pairing) {
 size_t place_of(const IndexPair& pair, const RowsOfPairs& rows, Pairing pairing) {
   return pairing == Pairing::kRows ? pair[0] : pair[0] * rows.b.size() + pair[1];
 }
+
+double common_volume(const Placed& a, const Placed& b, double tolerance) {
+  if (const std::optional<Measures> at_once = measure_at_once(a, b)) {
+    if (at_once->status == Status::kSeparated) return 0;
+    if (at_once->measured) return at_once->volume;
+  }
+  return Overlap(a, b, tolerance, Method::kAuto).volume();
+}
+
+/// True if the array has boxes or rectangles. All its rows are of one kind.
+bool of_boxes(std::span<const Placed> rows) { return !rows.empty() && std::holds_alternative<Box>(rows[0].shape); }
+
+double volume_around(const Placed& a, const Placed& b) {
+  std::vector<Vec3> corners;
+  for (const Placed* box : {&a, &b})
+    for (int i = 0; i < 8; ++i) corners.push_back(box->pose * vertex(box->shape, i));
+  return make_hull(corners).volume();
+}
+
+}  // namespace
+
+bool common_volumes(const ShapeArray& a, const ShapeArray& b, Pairing pairing, double tolerance, int threads,
+                    std::span<double> volumes) {
+  const RowsOfPairs rows(a, b);
+  const std::vector<IndexPair> pairs = pairs_of(rows, pairing);
+  const bool boxes = of_boxes(rows.a) && of_boxes(rows.b);
+  const size_t at_once = boxes ? kPairsAtOnce : 1;
+  std::ranges::fill(volumes, 0);
+  return for_each_in_parallel((pairs.size() + at_once - 1) / at_once, threads, [&](size_t k, int) {
+    const auto some = std::span(pairs).subspan(k * at_once, std::min(at_once, pairs.size() - k * at_once));
+    BoxVolumes found;
+    if (boxes) {
+      BoxList of_a, of_b;
+      for (size_t n = 0; n < at_once; ++n) {
+        const auto [i, j] = some[std::min(n, some.size() - 1)];
+        of_a[n] = &rows.a[i], of_b[n] = &rows.b[j];
+      }
+      found = volumes_of_boxes(of_a, of_b);
+    }
+    for (size_t n = 0; n < some.size(); ++n) {
+      const auto [i, j] = some[n];
+      const bool enough = boxes && found.error[n] <= kEnough * found.volume[n];
+      volumes[place_of(some[n], rows, pairing)] =
+          enough ? found.volume[n] : common_volume(rows.a[i], rows.b[j], tolerance);
+    }
+    return true;
+  });
+}
+
+bool volumes_around(const ShapeArray& a, const ShapeArray& b, Pairing pairing, int threads, std::span<double> volumes) {
+  const size_t columns = pairing == Pairing::kRows ? 1 : b.size();
+  return for_each_in_parallel(volumes.size(), threads, [&](size_t k, int) {
+    volumes[k] = volume_around(a.rows[k / columns], b.rows[pairing == Pairing::kRows ? k : k % columns]);
+    return true;
+  });
+}
+
+namespace {
+
+constexpr size_t kStretch = 1 << 14;  // pairs whose derivatives are kept until they are summed in order
 
 /// Calls `find(pair, place)` in parallel, and then `add(pair, place, found)` in order. False if the caller cancels.
 template <class Found, class Find, class Add>
@@ -161,7 +182,7 @@ AlongDirection along_direction(const Placed& a, const Placed& b, const std::arra
 
 bool add_gradients(const ShapeArray& a, const ShapeArray& b, Pairing pairing, std::span<const double> weights,
                    double tolerance, int threads, std::span<RowGradient> of_a, std::span<RowGradient> of_b) {
-  const RowsOfPairs rows(a, b, true);
+  const RowsOfPairs rows(a, b);
   std::vector<IndexPair> pairs = pairs_of(rows, pairing);
   const auto weight = [&](const IndexPair& pair) { return weights[place_of(pair, rows, pairing)]; };
   std::erase_if(pairs, [&](const IndexPair& pair) { return weight(pair) == 0; });
@@ -177,7 +198,7 @@ bool add_second_derivatives(const ShapeArray& a, const ShapeArray& b, Pairing pa
                             std::span<const RowGradient> along_a, std::span<const RowGradient> along_b,
                             double tolerance, int threads, std::span<double> slopes, std::span<RowGradient> of_a,
                             std::span<RowGradient> of_b) {
-  const RowsOfPairs rows(a, b, true);
+  const RowsOfPairs rows(a, b);
   std::ranges::fill(slopes, 0);
   return find_and_add<AlongDirection>(
       pairs_of(rows, pairing), threads,

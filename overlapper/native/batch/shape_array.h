@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <span>
 #include <vector>
 
@@ -19,23 +18,20 @@ struct ShapeArray {
   size_t size() const { return rows.size(); }
 };
 
-/// m³: the bits of Overlap(a, b, tolerance).volume().
-double common_volume(const Placed& a, const Placed& b, double tolerance);
-
-/// m³: the volume of the convex hull of two boxes.
-double volume_around(const Placed& a, const Placed& b);
-
-/// The pairs of two arrays: row i of both, or every row of the first with every row of the second.
+/// The pairs of two arrays: row i of both, or every row of the first with every row of the second. Values of pairs are
+/// arranged by rows: one per pair for kRows, otherwise a row for each row of the first array.
 enum class Pairing { kRows, kAll };
 
-/// A number for each pair.
-using PairValue = std::function<double(const Placed& a, const Placed& b)>;
+/// Writes the common volume of each pair, in m³. Rectangles must not meet other shapes. The bits do not depend on
+/// `threads`. False if the caller cancels.
+///
+/// Volumes of two boxes are those of volumes_of_boxes() if their error is within kEnough. All others have the bits of
+/// Overlap(a, b, tolerance).volume().
+bool common_volumes(const ShapeArray& a, const ShapeArray& b, Pairing pairing, double tolerance, int threads,
+                    std::span<double> volumes);
 
-/// Calls `value` for each pair, and writes the answers to `values`: a row per pair for kRows, otherwise by rows of `a`.
-/// With `culled`, a pair whose boxes are disjoint gets 0 at once. The bits do not depend on `threads`. False if the
-/// caller cancels. Rectangles must not meet other shapes.
-bool for_pairs(const ShapeArray& a, const ShapeArray& b, Pairing pairing, bool culled, int threads,
-               const PairValue& value, std::span<double> values);
+/// Writes the volume of the convex hull of each pair of boxes, in m³; otherwise as common_volumes().
+bool volumes_around(const ShapeArray& a, const ShapeArray& b, Pairing pairing, int threads, std::span<double> volumes);
 
 /// The derivatives of a weighted sum of common volumes by the numbers of one row. These are the numbers of its shape,
 /// as in shape_gradient(), its position, and a rotation vector about its position.
@@ -44,7 +40,7 @@ struct RowGradient {
 };
 
 /// Adds the derivatives of the weighted sum of the common volumes of pairs to the rows of both arrays. The weights are
-/// arranged as the values of for_pairs(). The bits do not depend on `threads`. False if the caller cancels.
+/// arranged as the values of pairs. The bits do not depend on `threads`. False if the caller cancels.
 bool add_gradients(const ShapeArray& a, const ShapeArray& b, Pairing pairing, std::span<const double> weights,
                    double tolerance, int threads, std::span<RowGradient> of_a, std::span<RowGradient> of_b);
 

@@ -210,12 +210,12 @@ void uninterrupted(const Work& work) {
   if (!finished) throw nb::python_error();
 }
 
-/// A number for each pair: (n,) for aligned rows, otherwise (n, m).
-nb::object values_of_pairs(const ShapeArray& a, const ShapeArray& b, bool aligned, bool culled, int threads,
-                           const PairValue& value) {
+/// A number for each pair: (n,) for aligned rows, otherwise (n, m). `find(pairing, values)` writes them.
+template <class Find>
+nb::object values_of_pairs(const ShapeArray& a, const ShapeArray& b, bool aligned, const Find& find) {
   const Pairing pairing = to_pairing(a, b, aligned);
   std::vector<double> values(aligned ? a.size() : a.size() * b.size());
-  uninterrupted([&] { return for_pairs(a, b, pairing, culled, threads, value, values); });
+  uninterrupted([&] { return find(pairing, std::span(values)); });
   if (aligned) return nb::cast(to_numpy<Vector>(std::move(values), {a.size()}), nb::rv_policy::move);
   return nb::cast(to_numpy<Matrix>(std::move(values), {a.size(), b.size()}), nb::rv_policy::move);
 }
@@ -325,10 +325,11 @@ of the given corner at each place of pytorch3d's order. `name` is the argument i
 void define_values(nb::module_& m) {
   m.def(
       "common_volumes",
-      [](const ShapeArray& a, const ShapeArray& b, bool aligned, nb::handle tolerance_given, nb::handle threads) {
+      [](const ShapeArray& a, const ShapeArray& b, bool aligned, nb::handle tolerance_given, nb::handle threads_given) {
         const double tolerance = to_tolerance(tolerance_given);
-        return values_of_pairs(a, b, aligned, true, to_threads(threads), [tolerance](const Placed& p, const Placed& q) {
-          return common_volume(p, q, tolerance);
+        const int threads = to_threads(threads_given);
+        return values_of_pairs(a, b, aligned, [&](Pairing pairing, std::span<double> volumes) {
+          return common_volumes(a, b, pairing, tolerance, threads, volumes);
         });
       },
       "a"_a, "b"_a, "aligned"_a, "tolerance"_a.none(), "threads"_a.none(),
@@ -337,11 +338,14 @@ void define_values(nb::module_& m) {
       "Common volumes in m³: (n,) of row i of both, or (n, m) of every row of `a` with every row of `b`.");
   m.def(
       "volumes_around",
-      [](const ShapeArray& a, const ShapeArray& b, bool aligned, nb::handle threads) {
+      [](const ShapeArray& a, const ShapeArray& b, bool aligned, nb::handle threads_given) {
         for (const auto& [rows, name] : {std::pair{&a, "a"}, {&b, "b"}})
           for (const Placed& row : rows->rows)
             if (!std::holds_alternative<Box>(row.shape)) fail(name, "must be boxes or rectangles");
-        return values_of_pairs(a, b, aligned, false, to_threads(threads), &volume_around);
+        const int threads = to_threads(threads_given);
+        return values_of_pairs(a, b, aligned, [&](Pairing pairing, std::span<double> volumes) {
+          return volumes_around(a, b, pairing, threads, volumes);
+        });
       },
       "a"_a, "b"_a, "aligned"_a, "threads"_a.none(),
       nb::sig("def volumes_around(a: ShapeArray, b: ShapeArray, aligned: bool, threads: int | None) -> "

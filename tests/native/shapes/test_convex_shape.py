@@ -13,6 +13,7 @@ CONE = Path(__file__).with_name("cone.h")
 
 # Questions about two given kinds, and lanes that hold all sides of a box.
 MAY_ASK_FOR_A_KIND = {
+    "batch/box_volumes.cpp",
     "batch/shape_array.cpp",
     "distance/box_axes.cpp",
     "methods/clipping/wide_corners.cpp",

@@ -37,11 +37,11 @@ double reach_of_crossing(double r, double s, double depth, double sine, double c
 /// and its sum over the middles of equal parts converges geometrically. The nearest singularities are on the far sides
 /// of the cylinders. For the deepest shallow contacts, the ratio is e^-3.4.
 SideContact sides_crossing(double r, double s, double depth, double sine) {
-  constexpr int kNodes = 8;
+  constexpr int kParts = 8;
   SideContact sum;
   double moment = 0;
-  for (int k = 0; k < kNodes; ++k) {
-    const double angle = (k + 0.5) * kPi / (2 * kNodes), half_sine = std::sin(angle), half_cosine = std::cos(angle);
+  for (int k = 0; k < kParts; ++k) {
+    const double angle = (k + 0.5) * kPi / (2 * kParts), half_sine = std::sin(angle), half_cosine = std::cos(angle);
     // Below the top of the first, and above the bottom of the second.
     const double below = depth * half_cosine * half_cosine, above = depth * half_sine * half_sine;
     const double t = r - below, u = s - above;
@@ -53,7 +53,7 @@ SideContact sides_crossing(double r, double s, double depth, double sine) {
     sum.area += r * half_sine * half_sine * second / first + s * half_cosine * half_cosine * first / second;
     sum.force += half_cosine * half_cosine * first / second * u;
   }
-  const double weight = 4 * depth / sine * kPi / kNodes;
+  const double weight = 4 * depth / sine * kPi / kParts;
   return {weight * depth * sum.volume, moment / sum.volume, weight * sum.area, weight * sum.force};
 }
 
