@@ -3,7 +3,7 @@
     python benchmarks million
     python benchmarks million --pairs 1000 --proved 10
 
-The first took 31 minutes on one processor, beside other work.
+The first took 8 minutes on one processor, beside other work.
 """
 
 from __future__ import annotations
