@@ -3,8 +3,9 @@
     python benchmarks boxes
 
 pytorch3d needs torch. `make test-torch` makes an environment with torch, in build/torch. Use its Python in the place of
-`python`, after
+`python`, after the following. easypytorch3d 0.7.9.post1 is compiled for torch 2.11 and does not load with 2.15.
 
+    build/torch/bin/python -m pip install torch==2.11.0
     build/torch/bin/python -m pip install --no-deps easypytorch3d iopath portalocker fvcore yacs termcolor tabulate tqdm
 """
 
