@@ -45,7 +45,7 @@ ROUND = [name for name in workloads.FAMILIES if workloads.pairs_of(name)[0].volu
 
 @pytest.mark.parametrize("family", ROUND)
 def test_round_shapes_have_the_volume_and_depth_of_their_truth(family):
-    for pair in workloads.pairs_of(family)[:2]:
+    for pair in workloads.pairs_of(family)[:1]:
         found = overlap(*pair.bodies)
         assert abs(Fraction(found.volume) - pair.volume) <= found.volume_error + pair.volume_within
         assert found.volume_error < 1e-2 * found.volume and pair.volume_within < 1e-14 * found.volume

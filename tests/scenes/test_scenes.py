@@ -98,15 +98,15 @@ def bodies_of(frame):
     return np.array(where), np.array(velocity)
 
 
-def test_friction_alone_holds_the_duck_in_the_air_for_ten_seconds():
+def test_friction_alone_holds_the_duck_in_the_air_for_five_seconds():
     duck, arm, left, right, lifted = 1, 2, 9, 10, 480
-    frames = run(scene("franka_lift"), lifted + 2400, only=range(lifted, lifted + 2401, 240))
+    frames = run(scene("franka_lift"), lifted + 1200, only=range(lifted, lifted + 1201, 240))
     places = []
     for frame in frames:
         (*_, place), velocity = (each[: duck + 1] for each in bodies_of(frame))
         places.append(place)
         weight = 9.81 * p.getDynamicsInfo(duck, -1, frame.bodies.physicsClientId)[0]
-    assert len(places) == 11 and places[0][2] > 0.15
+    assert len(places) == 6 and places[0][2] > 0.15
     assert np.ptp(places, axis=0).max() < 1e-4
     assert np.abs(velocity[duck]).max() < 1e-5
     assert {body for row in frame.forces.pairs[:, [0, 3]].tolist() for body in row} == {duck, arm}

@@ -48,7 +48,7 @@ def test_the_damping_by_default_does_not_slow_what_rolls():
     assert rolled[0][1] < rolled[0][0]
 
 
-@pytest.mark.parametrize("substeps", [1, 4, 20])
+@pytest.mark.parametrize("substeps", [1, 4])
 def test_a_sliding_box_stops_at_the_distance_that_friction_predicts(substeps):
     assert experiments.slide(substeps) == pytest.approx(1, abs=1e-4)
 

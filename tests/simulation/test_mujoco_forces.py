@@ -113,7 +113,7 @@ def test_the_cube_of_drake_22213_comes_to_rest():
     assert np.abs(data.qvel).max() < 1e-9 and np.abs(data.xmat[1].reshape(3, 3)[2, :2]).max() < 1e-9
 
 
-@pytest.mark.parametrize("substeps", [1, 4, 20])
+@pytest.mark.parametrize("substeps", [1, 4])
 def test_a_sliding_box_stops_at_the_distance_that_friction_predicts(substeps):
     """MuJoCo moves a body by the velocity that it has after a step: by v h / 2 too little."""
     model, data = simulated(free(FLAT, f"0 0 {0.01 - G / 1e6}"))

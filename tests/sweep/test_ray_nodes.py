@@ -13,6 +13,7 @@ import psutil
 import pytest
 import ray_nodes
 from busy import slowness
+from misdeeds import sweep_of_misdeeds
 from sweeping import begun, parts
 
 from overlapper.jobs import cluster as cluster_module
@@ -72,3 +73,9 @@ def test_three_nodes_do_thousands_of_items_by_few_references_and_a_broken_instal
             with pytest.raises(NotStarted, match=r"^the Ray cluster loses objects: "):
                 [*cluster.shares(broken, [("give", k) for k in range(9000)])]
         started.stdin.close()
+
+
+def test_tasks_that_misbehave_are_a_row_each_and_stop_no_other(tmp_path, monkeypatch):
+    pytest.importorskip("ray")
+    monkeypatch.chdir(tmp_path)
+    sweep_of_misdeeds("ray")

@@ -22,9 +22,9 @@ def test_paper_agrees_with_auto_on_two_thousand_pairs_in_general_position():
     assert_allclose(ratios, 1, rtol=1e-9)
 
 
-def test_both_methods_agree_with_the_exact_truth_on_five_hundred_pairs():
+def test_both_methods_agree_with_the_exact_truth_on_two_hundred_pairs():
     truth, paper, auto, bounds = [], [], [], []
-    for p, q in random_pairs(500, seed=1):
+    for p, q in random_pairs(200, seed=1):
         truth.append(float(exact.common(exact.hull(p), exact.hull(q)).volume))
         first, second = overlap(p, q, method="paper"), overlap(p, q)
         paper.append(first.volume)

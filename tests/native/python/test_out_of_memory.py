@@ -5,7 +5,7 @@ import resource
 
 from overlapper import Box, Overlap, Placed, Sphere, overlap
 
-TOLERANCE = 1e-7  # of the polytope of a ball on an edge: hundreds of megabytes
+TOLERANCE = 1e-5  # of the polytope of a ball on an edge: hundreds of megabytes
 
 
 def ball_on_an_edge() -> Overlap:
@@ -23,7 +23,7 @@ def limit_memory(further: int) -> None:
 def corners_in_little_memory_and_then_in_enough() -> list[object]:
     common = ball_on_an_edge()
     said: list[object] = []
-    for further in (60_000_000, 60_000_000, -1):
+    for further in (20_000_000, 20_000_000, -1):
         limit_memory(further)
         try:
             said.append(len(common.vertices))
