@@ -136,7 +136,7 @@ def size_of(body):
 def test_no_separating_translation_is_shorter_than_the_depth_minus_its_error(kind, axes):
     rng = np.random.default_rng([KINDS.index(kind), len(axes)])
     deep = 0
-    for scale in (1e-3, 1, 1, 1, 1, 1e3):
+    for scale in (1e-3, 1, 1, 1e3):
         p, q = orientations(rng, axes)
         centre = 10 * scale * rng.normal(size=3)
         beside = rotation(p) @ (rng.choice([0, 1], 3) * rng.normal(size=3)) * scale * 10 ** rng.uniform(-3, 0)
@@ -154,7 +154,7 @@ def test_no_separating_translation_is_shorter_than_the_depth_minus_its_error(kin
             assert abs(way_out(one, other, answer.normal) - Fraction(answer.depth)) <= error + Fraction(1e-14 * size)
             shortest = way_out(one, other, shortest_way_out(rng, one, other))
             assert shortest >= Fraction(answer.depth) - error
-    assert deep > 3
+    assert deep > 1
 
 
 @pytest.mark.parametrize("axes", ["crossed", "parallel", "nearly parallel"])
