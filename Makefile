@@ -17,6 +17,8 @@ LEAST_OF_CORE := 90
 unexport PYTHONDONTWRITEBYTECODE
 # Tests that start a Ray cluster of several nodes, which takes a sixth of the time of all tests.
 CLUSTER := tests/sweep/test_ray_nodes.py
+# One more process than processors, because many tests wait for a clock or a browser.
+WORKERS = $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
 # Coverage of the core: its object files, its tests, and tests that fail in a build with counters.
 COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
@@ -32,7 +34,7 @@ run: $(VENV)/run ## build, run SCENE=franka_grasp, write out/franka_grasp.csv an
 
 test: $(VENV)/dev ## build, pass all tests except those of a Ray cluster
 	@echo "These tests take 10 to 20 minutes on 2 processors. Tests of a Ray cluster are another target: make test-cluster"
-	@$(PYTEST) --numprocesses=auto --dist=worksteal $(CLUSTER:%=--ignore=%)
+	@$(PYTEST) --numprocesses=$(WORKERS) --dist=worksteal $(CLUSTER:%=--ignore=%)
 
 test-cluster: $(VENV)/dev ## build, pass the tests of a Ray cluster of several nodes on this machine
 	@$(PYTEST) $(CLUSTER)
