@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,71 @@ def second_derivatives(
     return np.reshape(by_weights, stack + shape), [
         np.reshape(found, np.shape(given)) if found else np.zeros(np.shape(given)) for found, given in zip(sums, six)
     ]
+
+
+class Directions(NamedTuple):
+    """The least translations that separate boxes: their lengths, and weights of the boxes' axes along them.
+
+    A direction is a face normal of `a` or of `b`, or is orthogonal to an edge of each. The weights of all other kinds
+    are zero.
+    """
+
+    depth: Any  # (...), 0 for boxes that are apart
+    face_a: Any  # (..., 3)
+    face_b: Any
+    edge_a: Any
+    edge_b: Any
+
+
+def directions(six: Sequence[Any], aligned: bool, threads: int | None) -> Directions:
+    """Depths and directions: (..., n, m) of every row of `a` with every row of `b`, or (...,) of aligned rows."""
+    rows, stack, shape = _stacked(six, aligned)
+    found = [_directions(each, aligned, threads) for each in zip(*rows)]
+    return Directions(
+        *(
+            np.reshape([each[k] for each in found], (*stack, *shape, *((3,) if k else ())))
+            for k in range(len(Directions._fields))
+        )
+    )
+
+
+def depths(xp: Any, six: Sequence[Any], along: Directions, aligned: bool) -> Any:
+    """The depths along given directions, by functions of torch or jax.numpy that can be differentiated.
+
+    The depth is the sum of the extents of both boxes along the direction, less the distance of their centres.
+    """
+
+    def spread(each: Any, of_b: int) -> Any:
+        return each if aligned else each[..., None, :, :] if of_b else each[..., :, None, :]
+
+    (half_a, at_a, turn_a), (half_b, at_b, turn_b) = (
+        (spread(size, of_b) / 2, spread(position, of_b), rotations(xp, spread(quaternion, of_b)))
+        for of_b, (size, position, quaternion) in enumerate((six[:3], six[3:]))
+    )
+
+    def weighted(turn: Any, weights: Any) -> Any:
+        return (turn * weights[..., None, :]).sum(-1)
+
+    edges = xp.linalg.cross(weighted(turn_a, along.edge_a), weighted(turn_b, along.edge_b))
+    normal = weighted(turn_a, along.face_a) + weighted(turn_b, along.face_b) + edges
+    normal = normal / xp.sqrt((normal * normal).sum(-1))[..., None]
+    extents = sum(
+        (half * xp.abs((turn * normal[..., :, None]).sum(-2))).sum(-1)
+        for half, turn in ((half_a, turn_a), (half_b, turn_b))
+    )
+    return (extents - (normal * (at_a - at_b)).sum(-1)) * (along.depth > 0)
+
+
+def rotations(xp: Any, quaternions: Any) -> Any:
+    """(..., 3, 3) rotation matrices of quaternions of any length, by functions of torch or jax.numpy."""
+    unit = quaternions / xp.sqrt((quaternions * quaternions).sum(-1))[..., None]
+    x, y, z, w = (unit[..., k] for k in range(4))
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return xp.stack([xp.stack(row, -1) for row in rows], -2)
 
 
 def check(six: Sequence[Any], aligned: bool) -> None:
@@ -164,3 +229,34 @@ def _named(name: str, three: Sequence[Numbers]) -> ShapeArray:
         return _core.boxes(*three)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
+
+
+def _directions(six: Sequence[Numbers], aligned: bool, threads: int | None) -> Directions:
+    both = _both(six)
+    n = len(six[0])
+    pairs = np.indices((n, 1 if aligned else len(six[3]))).reshape(2, -1).T
+    of_a, of_b = pairs[:, 0], pairs[:, 0] if aligned else pairs[:, 1]
+    boxes = [_core.Box(half) for half in np.vstack([six[0], six[3]]) / 2]
+    positions, orientations = (np.vstack([six[k], six[k + 3]]) for k in (1, 2))
+    found = _core.overlaps(boxes, positions, orientations, np.c_[of_a, n + of_b], threads=threads)
+    turn_a, turn_b = both[0].rotations[of_a], both[1].rotations[of_b]
+    edges = np.cross(turn_a[:, :, :, None], turn_b[:, :, None, :], axis=1).reshape(-1, 3, 9)
+    # Parallel edges have no direction. They are as far from any normal as can be.
+    lengths = np.linalg.norm(edges, axis=1, keepdims=True)
+    edges = np.divide(edges, lengths, out=np.zeros_like(edges), where=lengths > 0)
+    every = np.concatenate([turn_a, turn_b, edges], axis=2)
+    normal = found.normal[:, :, None]
+    along = (every * normal).sum(1)
+    off = np.linalg.norm(every - along[:, None] * normal, axis=1) + (along == 0)
+    # A direction may be a face normal and orthogonal to two edges. Then the face counts.
+    off[:, 6:] += 1e-9
+    best = off.argmin(1)
+    side = np.where(along[np.arange(len(best)), best] < 0, -1.0, 1.0)
+    unit, edge = np.eye(3), best - 6
+    kinds = (
+        (best < 3, best, side),
+        ((best >= 3) & (best < 6), best - 3, side),
+        (best >= 6, edge // 3, side),
+        (best >= 6, edge % 3, np.ones_like(side)),
+    )
+    return Directions(found.depth, *((chosen * size)[:, None] * unit[axis % 3] for chosen, axis, size in kinds))

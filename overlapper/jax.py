@@ -1,8 +1,9 @@
-"""Common volumes and IoU of oriented boxes as differentiable functions of JAX arrays, under `jit` and `vmap`.
+"""Common volumes, IoU and depths of oriented boxes as differentiable functions of JAX arrays, under `jit` and `vmap`.
 
 The numbers are computed on the processor in float64 by `jax.pure_callback`. Results have the dtype of the sizes of `a`.
 There are first and second derivatives, in reverse mode only: `jax.jacrev(jax.grad(f))`, not `jax.hessian(f)`. A second
-derivative is NaN where a face of one box lies in the plane of a face of the other.
+derivative of a volume is NaN where a face of one box lies in the plane of a face of the other. Depths have derivatives
+in both modes.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ try:
 except ImportError as error:
     raise ImportError(f"overlapper.jax needs {hint('jax')}") from error
 
-__all__ = ["Boxes", "iou", "volume"]
+__all__ = ["Boxes", "depth", "iou", "volume"]
 
 
 class Boxes(NamedTuple):
@@ -105,6 +106,52 @@ def iou(a: Boxes, b: Boxes, *, aligned: bool = False, threads: int | None = 1) -
     return ratio - jax.lax.stop_gradient(jnp.maximum(ratio - 1, 0))
 
 
+def depth(a: Boxes, b: Boxes, *, aligned: bool = False, threads: int | None = 1) -> jax.Array:
+    """Penetration depths of boxes: the length of the shortest translation that separates each pair.
+
+    Parameters
+    ----------
+    a, b : Boxes
+        Two sets of boxes. Aligned boxes may have any leading dimensions, or none.
+    aligned : bool, default False
+        True for row i of `a` with row i of `b`. False for every row of `a` with every row of `b`.
+    threads : int or None, default 1
+        Number of threads; None for one per processor.
+
+    Returns
+    -------
+    (n, m) or (n,) jax.Array
+        Depths in m. 0 for pairs that do not overlap; their derivatives are 0. Where two directions have the same depth,
+        and where an edge or a face is parallel to a face, derivatives are one-sided.
+
+    Raises
+    ------
+    ValueError
+        As for `volume`.
+
+    Examples
+    --------
+    >>> import jax, jax.numpy as jnp
+    >>> from overlapper.jax import Boxes, depth
+    >>> a = Boxes(jnp.full(3, 2.0), jnp.zeros(3), jnp.array([0, 0, 0, 1.0]))
+    >>> deep = lambda x: depth(a, a._replace(positions=jnp.array([x, 0, 0])), aligned=True)
+    >>> jax.value_and_grad(deep)(1.5)
+    (Array(0.5, dtype=float32), Array(-1., dtype=float32, weak_type=True))
+    """
+    six = (*a, *b)
+    box_gradients.check(six, aligned)
+    shape = a.sizes.shape[:-1] if aligned else (*a.sizes.shape[:-1], b.sizes.shape[-2])
+    kind = a.sizes.dtype
+    answer = jax.eval_shape(
+        lambda: box_gradients.Directions(jnp.empty(shape, kind), *(jnp.empty((*shape, 3), kind) for _ in range(4)))
+    )
+    given = map(jax.lax.stop_gradient, six)
+    along = jax.pure_callback(_directions(aligned, threads), answer, *given, vmap_method="broadcast_all")
+    formula = box_gradients.depths(jnp, six, along, aligned)
+    found: jax.Array = formula + jax.lax.stop_gradient(along.depth - formula)
+    return found
+
+
 @partial(jax.custom_vjp, nondiff_argnums=(2, 3))
 def _volume(a: Any, b: Any, aligned: bool, threads: int | None) -> Any:
     box_gradients.check([*a, *b], aligned)
@@ -171,5 +218,14 @@ def _bends(aligned: bool, threads: int | None) -> Any:
     def compute(weights: Any, *twelve: Any) -> Any:
         by_weights, by_six = box_gradients.second_derivatives(twelve[:6], weights, twelve[6:], aligned, threads)
         return tuple(each.astype(given.dtype) for each, given in zip((by_weights, *by_six), (weights, *twelve)))
+
+    return compute
+
+
+@cache
+def _directions(aligned: bool, threads: int | None) -> Any:
+    def compute(*six: Any) -> Any:
+        found = box_gradients.directions(six, aligned, threads)
+        return box_gradients.Directions(*(each.astype(six[0].dtype) for each in found))
 
     return compute

@@ -1,9 +1,9 @@
-"""Common volumes and IoU of oriented boxes as differentiable functions of torch tensors.
+"""Common volumes, IoU and depths of oriented boxes as differentiable functions of torch tensors.
 
 The numbers are computed on the processor in float64. Tensors of a GPU are copied to the processor and back. Results
 have the dtype and the device of the sizes of `a`. There are first and second derivatives; by the corners of
-`box3d_overlap` and `boxes_of_corners`, there are first derivatives only. A second derivative is NaN where a face of one
-box lies in the plane of a face of the other.
+`box3d_overlap` and `boxes_of_corners`, there are first derivatives only. A second derivative of a volume is NaN where a
+face of one box lies in the plane of a face of the other.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ try:
 except ImportError as error:
     raise ImportError(f"overlapper.torch needs {hint('torch')}") from error
 
-__all__ = ["Boxes", "box3d_overlap", "boxes_of_corners", "corners", "iou", "volume"]
+__all__ = ["Boxes", "box3d_overlap", "boxes_of_corners", "corners", "depth", "iou", "volume"]
 
 
 NO_SECOND = "overlapper.torch has first derivatives only by corners"
@@ -107,6 +107,47 @@ def iou(a: Boxes, b: Boxes, *, aligned: bool = False, threads: int | None = 1) -
     return _ratio(_exact(a, b, aligned, threads), a, b, aligned).to(a[0])
 
 
+def depth(a: Boxes, b: Boxes, *, aligned: bool = False, threads: int | None = 1) -> Tensor:
+    """Penetration depths of boxes: the length of the shortest translation that separates each pair.
+
+    Parameters
+    ----------
+    a, b : Boxes
+        Two sets of boxes.
+    aligned : bool, default False
+        True for row i of `a` with row i of `b`. False for every row of `a` with every row of `b`.
+    threads : int or None, default 1
+        Number of threads; None for one per processor.
+
+    Returns
+    -------
+    (n, m) or (n,) Tensor
+        Depths in m. 0 for pairs that do not overlap; their derivatives are 0. Where two directions have the same depth,
+        and where an edge or a face is parallel to a face, derivatives are one-sided.
+
+    Raises
+    ------
+    ValueError
+        As for `volume`.
+
+    Examples
+    --------
+    >>> import torch
+    >>> from overlapper.torch import Boxes, depth
+    >>> turned = torch.tensor([[0, 0, 0, 1.0]])
+    >>> place = torch.tensor([[1.5, 0, 0]], requires_grad=True)
+    >>> a, b = (Boxes(torch.full((1, 3), 2.0), at, turned) for at in (place, torch.zeros(1, 3)))
+    >>> deep = depth(a, b, aligned=True)
+    >>> deep.item(), torch.autograd.grad(deep.sum(), place)[0][0, 0].item()
+    (0.5, -1.0)
+    """
+    six = [each.to("cpu", torch.float64) for each in (*a, *b)]
+    found = box_gradients.directions([each.detach().numpy() for each in six], aligned, threads)
+    along = box_gradients.Directions(*map(_tensor, found))
+    formula = box_gradients.depths(torch, six, along, aligned)
+    return (formula + (along.depth - formula).detach()).to(a[0])
+
+
 def boxes_of_corners(corners: Tensor) -> Boxes:
     """Boxes from their 8 corners, as `overlapper.arrays.boxes_of_corners`.
 
@@ -142,14 +183,9 @@ def corners(boxes: Boxes) -> Tensor:
         Corners, m.
     """
     unit = torch.as_tensor(UNIT_CORNERS).to(boxes.sizes)
-    x, y, z, w = (boxes.orientations / boxes.orientations.norm(dim=-1, keepdim=True)).unbind(-1)
-    rows = [
-        torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], -1),
-        torch.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], -1),
-        torch.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], -1),
-    ]
     local = unit * boxes.sizes[..., None, :]
-    return local @ torch.stack(rows, -2).transpose(-1, -2) + boxes.positions[..., None, :]
+    turned = box_gradients.rotations(torch, boxes.orientations)
+    return local @ turned.transpose(-1, -2) + boxes.positions[..., None, :]
 
 
 def box3d_overlap(boxes1: Tensor, boxes2: Tensor, eps: float = 1e-4) -> tuple[Tensor, Tensor]:

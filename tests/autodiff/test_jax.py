@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from box_pairs import general_boxes
 
-from overlapper import arrays
-from overlapper.jax import Boxes, iou, volume
+from overlapper import Box, Placed, arrays, overlap
+from overlapper.jax import Boxes, depth, iou, volume
 
 
 @pytest.fixture(autouse=True)
@@ -37,7 +37,7 @@ def slopes(function, *boxes):
     return found
 
 
-@pytest.mark.parametrize("function", [volume, iou])
+@pytest.mark.parametrize("function", [volume, iou, depth])
 @pytest.mark.parametrize("aligned", [True, False])
 def test_derivatives_against_differences(function, aligned):
     a, b = boxes(1, 3), boxes(2, 3)
@@ -51,7 +51,7 @@ def test_derivatives_against_differences(function, aligned):
             np.testing.assert_allclose(found, slope, atol=1e-7)
 
 
-@pytest.mark.parametrize("function", [volume, iou])
+@pytest.mark.parametrize("function", [volume, iou, depth])
 @pytest.mark.parametrize("aligned", [True, False])
 def test_second_derivatives_against_differences(function, aligned):
     a, b = boxes(1, 3), boxes(2, 3)
@@ -92,6 +92,29 @@ def test_values_are_those_of_arrays():
     assert np.array_equal(volume(a, b), arrays.volume(*numbers))
     assert np.array_equal(jax.jit(volume)(a, b), arrays.volume(*numbers))
     np.testing.assert_allclose(iou(a, b), arrays.iou(*numbers), rtol=1e-15)
+
+
+def test_depths_are_those_of_overlaps_under_jit_and_vmap():
+    a, b = boxes(1), boxes(2, 4)
+    placed = [[Placed(Box(s / 2), p, q) for s, p, q in zip(*map(np.asarray, rows))] for rows in (a, b)]
+    pairs = [[overlap(one, other) for other in placed[1]] for one in placed[0]]
+    expected = np.array([[pair.depth for pair in row] for row in pairs])
+    every = jax.vmap(lambda p: jax.vmap(lambda q: depth(p, q, aligned=True))(b))(a)
+    for found in (depth(a, b), jax.jit(depth)(a, b), every):
+        np.testing.assert_allclose(found, expected, atol=1e-15)
+    assert (expected > 0).any()
+    slope = jax.grad(lambda x: depth(a._replace(positions=x), b).sum())(a.positions)
+    normals = [sum((pair.normal for pair in row if pair), np.zeros(3)) for row in pairs]
+    np.testing.assert_allclose(slope, -np.array(normals), atol=1e-13)
+    single = jax.tree.map(lambda each: each[0], (a, b))
+
+    def of_place(x):
+        return depth(single[0]._replace(positions=x), single[1], aligned=True)
+
+    place = single[0].positions
+    np.testing.assert_allclose(jax.hessian(of_place)(place), jax.jacrev(jax.grad(of_place))(place), atol=1e-12)
+    apart = b._replace(positions=b.positions + 100)
+    assert not jax.grad(lambda x: depth(a._replace(sizes=x), apart).sum())(a.sizes).any()
 
 
 def test_vmap_over_rows_and_over_stacks():

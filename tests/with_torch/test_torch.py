@@ -11,8 +11,8 @@ import torch
 from box_pairs import general_boxes
 
 import overlapper.torch
-from overlapper import arrays
-from overlapper.torch import Boxes, box3d_overlap, boxes_of_corners, corners, iou, volume
+from overlapper import Box, Placed, arrays, overlap
+from overlapper.torch import Boxes, box3d_overlap, boxes_of_corners, corners, depth, iou, volume
 
 N = 12
 
@@ -26,7 +26,7 @@ def checked(function, *tensors):
     return torch.autograd.gradcheck(function, tensors, eps=1e-6, atol=1e-6, rtol=1e-5)
 
 
-@pytest.mark.parametrize("function", [volume, iou])
+@pytest.mark.parametrize("function", [volume, iou, depth])
 @pytest.mark.parametrize("aligned", [True, False])
 def test_gradcheck_by_size_position_and_quaternion(function, aligned):
     a, b = boxes(1), boxes(2, N if aligned else 5)
@@ -57,6 +57,47 @@ def test_values_are_those_of_arrays():
     assert volume(a, b, threads=None).equal(volume(a, b))
     assert np.abs(iou(a, b).detach().numpy() - arrays.iou(*numbers)).max() < 1e-15
     assert volume(a, a, aligned=True).equal(volume(a, a).diagonal())
+
+
+def edges_to_edges(n):
+    """Pairs of boxes that separate along the cross product of two edges."""
+    rng, found = np.random.default_rng(3), []
+    while len(found) < n:
+        numbers = general_boxes(rng, 2)
+        pair = overlap(*(Placed(Box(size / 2), at, turn) for size, at, turn in zip(*numbers)))
+        axes = np.hstack(list(arrays.boxes(*numbers).rotations))
+        if pair and abs(pair.normal @ axes).max() < 0.999:
+            found.append(numbers)
+    columns = [np.stack([numbers[k] for numbers in found]) for k in range(3)]
+    return [Boxes(*(torch.tensor(column[:, body], requires_grad=True) for column in columns)) for body in (0, 1)]
+
+
+def test_gradcheck_of_the_depth_between_edges():
+    a, b = edges_to_edges(4)
+
+    def deep(*six):
+        return depth(Boxes(*six[:3]), Boxes(*six[3:]), aligned=True)
+
+    assert (deep(*a, *b) > 0).all()
+    assert checked(deep, *a, *b) and torch.autograd.gradgradcheck(deep, (*a, *b), eps=1e-6, atol=1e-5)
+
+
+def test_depths_are_those_of_overlaps_and_move_along_their_normals():
+    a, b = boxes(1), boxes(2, 7)
+    found = depth(a, b)
+    (slope,) = torch.autograd.grad(found.sum(), a.positions)
+    placed = [
+        [Placed(Box(s / 2), p, q) for s, p, q in zip(*(each.detach().numpy() for each in rows))] for rows in (a, b)
+    ]
+    pairs = [[overlap(one, other) for other in placed[1]] for one in placed[0]]
+    assert np.abs(found.detach().numpy() - [[pair.depth for pair in row] for row in pairs]).max() <= 1e-15
+    normals = [sum((pair.normal for pair in row if pair), np.zeros(3)) for row in pairs]
+    assert np.abs(slope.numpy() + normals).max() < 1e-13 and slope.any()
+    apart = depth(a, b._replace(positions=b.positions + 100))
+    assert not apart.any() and not torch.autograd.grad(apart.sum(), a.sizes)[0].any()
+    assert depth(a, Boxes(*(each[:0] for each in b))).shape == (N, 0)
+    single = depth(*(Boxes(*(each.detach().float() for each in rows)) for rows in (a, b)))
+    assert single.dtype == torch.float32 and torch.allclose(single.double(), found, atol=1e-6)
 
 
 def test_single_precision_stays_single_precision():
@@ -93,7 +134,7 @@ def test_boxes_that_are_apart_have_the_derivative_zero():
     assert not any(each.grad.any() for each in a)
 
 
-@pytest.mark.parametrize("function", [volume, iou])
+@pytest.mark.parametrize("function", [volume, iou, depth])
 @pytest.mark.parametrize("aligned", [True, False])
 def test_gradgradcheck_by_size_position_and_quaternion(function, aligned):
     a, b = boxes(1, 4), boxes(2, 4 if aligned else 2)
