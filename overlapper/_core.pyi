@@ -705,11 +705,11 @@ class Overlap:
         """
         (m, 3) d volume / d (half extents) of each box, m². For a half-space, d volume / d (offset along its unit normal), then
         zeros. For round bodies: d volume / d radius of a sphere or a rounded hull, then zeros; d volume / d (radius, length) of a
-        capsule or a cylinder, then zero. It is the integral over the common surface of the speed at which the surface moves out.
-        Where faces of two bodies lie in one plane, the volume has two one-sided derivatives, and the area counts for either body.
-        For groups with a round body, it is that of an enclosing polytope. NaN for ellipsoids and for hulls, which have
-        `vertex_gradients`; for boxes, cylinders and lengths of bodies that overlap an ellipsoid; for a length of 0. Zeros unless
-        overlapping. `errors.shape_gradient` bounds the errors.
+        capsule or a cylinder, then zero; d volume / d (half axes) of an ellipsoid. It is the integral over the common surface of
+        the speed at which the surface moves out. Where faces of two bodies lie in one plane, the volume has two one-sided
+        derivatives, and the area counts for either body. For groups with a round body, it is that of an enclosing polytope. NaN for
+        hulls, which have `vertex_gradients`; for the length 0 of a capsule; for ellipsoids in groups. NaN also for the few pairs
+        with an ellipsoid that cannot be sliced. Zeros unless overlapping. `errors.shape_gradient` bounds the errors.
         """
 
     @property

@@ -432,8 +432,9 @@ class Gradient(NamedTuple):
     Parameters
     ----------
     sizes : (n, k) ndarray
-        By the side lengths of boxes (k = 3) or rectangles (2), by the radius of spheres (1), or by the radius and the
-        length of capsules and cylinders (2). NaN where `Overlap.shape_gradient` is NaN, as for ellipsoids (3).
+        By the side lengths of boxes (k = 3) or rectangles (2), by the radius of spheres (1), by the radius and the
+        length of capsules and cylinders (2), or by the half axes of ellipsoids (3). NaN where
+        `Overlap.shape_gradient` is NaN.
     positions : (n, 3) ndarray
         By the centres. (n, 2) for rectangles.
     rotations : (n, 3) ndarray

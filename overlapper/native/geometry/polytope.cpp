@@ -42,8 +42,6 @@ Polytope polar_dual(const ExpandingHull& hull) {
 
 namespace {
 
-Mat3 outer(Vec3 a, Vec3 b) { return {a.x * b, a.y * b, a.z * b}; }
-
 void add(Mat3& m, double s, const Mat3& other) {
   m.row0 += s * other.row0;
   m.row1 += s * other.row1;

@@ -66,6 +66,11 @@ inline Mat3 operator*(const Mat3& a, const Mat3& b) {
   return {apply_transposed(b, a.row0), apply_transposed(b, a.row1), apply_transposed(b, a.row2)};
 }
 
+inline Mat3 operator+(const Mat3& a, const Mat3& b) { return {a.row0 + b.row0, a.row1 + b.row1, a.row2 + b.row2}; }
+inline Mat3 operator-(const Mat3& a, const Mat3& b) { return {a.row0 - b.row0, a.row1 - b.row1, a.row2 - b.row2}; }
+/// a bᵀ.
+inline Mat3 outer(Vec3 a, Vec3 b) { return {a.x * b, a.y * b, a.z * b}; }
+
 /// Scalar last as in pybullet. A quaternion of any length but 0 stands for the rotation M(q) / |q|², which is rational.
 struct Quaternion {
   double x = 0, y = 0, z = 0, w = 1;

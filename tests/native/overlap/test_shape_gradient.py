@@ -89,7 +89,6 @@ def test_half_spaces_and_numbers_without_a_derivative():
     assert_allclose(overlap(box, water).shape_gradient, [[2 * 4 * 3.5, 2 * 2 * 3.5, 8], [8, 0, 0]], rtol=1e-15)
     hull = overlap(Hull(random_polytope(20, rng=1).vertices), Box((0.3, 0.3, 0.3))).shape_gradient
     assert np.isnan(hull[0]).all() and np.isfinite(hull[1]).all()
-    assert np.isnan(overlap(Ellipsoid((1, 1, 2)), Sphere(1.0), Box((1, 1, 1))).shape_gradient[0]).all()
     apart = overlap(Box((1, 1, 1)), Placed(Box((1, 1, 1)), (5, 0, 0)))
     assert not apart.shape_gradient.any()
 
@@ -143,12 +142,119 @@ def test_euler_holds_for_round_pairs(kind):
             assert of_sizes - found.gradient[0, :3] @ position == pytest.approx(3 * found.volume, rel=1e-9)
 
 
-def test_a_ball_and_an_ellipsoid_have_the_derivative_by_the_radius_alone():
-    found = overlap(Sphere(0.5), Placed(Ellipsoid((0.4, 0.5, 0.6)), (0.3, 0.2, 0.1))).shape_gradient
-    volumes = [overlap(Sphere(r), Placed(Ellipsoid((0.4, 0.5, 0.6)), (0.3, 0.2, 0.1))).volume for r in (0.4999, 0.5001)]
-    assert found[0, 0] == pytest.approx((volumes[1] - volumes[0]) / 2e-4, rel=1e-6) and np.isnan(found[1]).all()
-    assert np.isnan(overlap(Box((1, 1, 0.2)), Ellipsoid((0.4, 0.5, 0.6))).shape_gradient).all()
+def test_a_capsule_of_length_0_has_no_derivative_by_the_length():
     assert np.isnan(overlap(Capsule(0.5, 0), Box((0.3, 0.3, 0.3))).shape_gradient[0, 1])
+    found = overlap(Capsule(0.5, 0), Placed(Ellipsoid((0.3, 0.4, 0.5)), (0.5, 0, 0)))
+    assert np.isnan(found.shape_gradient[0, 1]) and np.isnan(found.errors.shape_gradient[0, 1])
+    assert np.isfinite(found.shape_gradient[1]).all()
+
+
+HALF_AXES = np.array([0.7, 0.4, 0.5])
+BESIDE_ELLIPSOIDS = {
+    **ROUND,
+    "ellipsoid": (lambda *half: Ellipsoid(half), (0.5, 0.3, 0.4)),
+    "ball": (lambda *half: Ellipsoid(half), (0.5, 0.5, 0.5)),
+    "half-space": (lambda offset: HalfSpace((0.6, 0, 0.8), offset), (0.3,)),
+    "hull": (lambda: Hull(random_polytope(20, rng=1).vertices * 0.6), ()),
+}
+
+
+@pytest.mark.parametrize("kind", BESIDE_ELLIPSOIDS)
+@pytest.mark.parametrize("half_axes", [HALF_AXES, np.full(3, 0.5)], ids=["ellipsoid", "ball"])
+def test_numbers_of_pairs_with_an_ellipsoid_against_differences_of_volumes(kind, half_axes):
+    make, numbers = BESIDE_ELLIPSOIDS[kind]
+    rng = np.random.default_rng(11)
+    step, compared = 1e-5, 0
+    for _ in range(4):
+        pose = rng.normal(size=3) * 0.3, quaternion(rng)
+
+        def volume(half, sizes, pose=pose):
+            return overlap(Ellipsoid(half), Placed(make(*sizes), *pose), tolerance=1e-9).volume
+
+        pair = overlap(Ellipsoid(half_axes), Placed(make(*numbers), *pose))
+        if pair.status != "overlapping":
+            continue
+        found, stated = pair.shape_gradient, pair.errors.shape_gradient
+        for k in range(3):
+            by = step * np.eye(3)[k]
+            slope = (volume(half_axes + by, numbers) - volume(half_axes - by, numbers)) / (2 * step)
+            assert found[0, k] == pytest.approx(slope, abs=5e-9)
+        for k in range(len(numbers)):
+            by = step * np.eye(len(numbers))[k]
+            slope = (volume(half_axes, numbers + by) - volume(half_axes, numbers - by)) / (2 * step)
+            assert found[1, k] == pytest.approx(slope, abs=5e-9)
+        if kind != "hull":
+            assert not found[1, len(numbers) :].any() and not stated[1, len(numbers) :].any()
+            assert (stated[1, : len(numbers)] > 0).all()
+        assert (stated[0] > 0).all() and np.nanmax(stated) <= 1e-8 * pair.area
+        compared += 1
+    assert compared >= 2
+
+
+@pytest.mark.parametrize("depth", [1.0, 0.1, 1e-3, 1e-6, 1e-9])
+def test_half_axes_against_the_closed_form_of_a_cap(depth):
+    # Stretched to the unit ball, the ellipsoid has a cap. If the plane is at d, V = abc π (2/3 + d − d³/3).
+    rng = np.random.default_rng(2)
+    for _ in range(5):
+        h, n = rng.uniform(0.1, 1, 3), rng.normal(size=3)
+        n /= np.linalg.norm(n)
+        reach = np.linalg.norm(h * n)
+        offset = reach * (depth - 1)
+        found = overlap(Ellipsoid(h), HalfSpace(n, offset))
+        d = offset / np.linalg.norm(h * n)
+        cap = np.pi * (1 + d) ** 2 * (2 - d) / 3
+        area = np.pi * (1 - d) * (1 + d)
+        expected = h.prod() * (cap / h - area * d * h * n**2 / reach**2)
+        off = np.abs(found.shape_gradient[0] - expected)
+        rounding = 4e-16 * h.prod() * 2 * np.pi / h.min()  # of d, and so of the area, for doubles as given
+        assert (off <= found.errors.shape_gradient[0] + rounding).all()
+        assert off.max() <= 1e-10 * found.area + rounding
+        assert found.shape_gradient[1, 0] == pytest.approx(h.prod() * area / reach, rel=1e-6, abs=rounding)
+
+
+@pytest.mark.parametrize("distance", [0.05, 0.2, 0.7, 0.9999])
+def test_an_ellipsoid_that_is_a_ball_has_the_derivative_of_the_ball(distance):
+    rng = np.random.default_rng(3)
+    for other in (Sphere(0.5), Box((0.4, 0.5, 0.6)), Capsule(0.4, 0.3), Cylinder(0.4, 0.6)):
+        for axes in ((0.5, 0.5, 0.5), (0.5, 0.5, 0.5 + 1e-13)):
+            body = Placed(other, distance * np.array([0.6, 0.0, 0.8]), quaternion(rng))
+            ball, found = overlap(Sphere(0.5), body), overlap(Ellipsoid(axes), body)
+            assert found.shape_gradient[0].sum() == pytest.approx(ball.shape_gradient[0, 0], rel=1e-7, abs=1e-11)
+
+
+def test_two_balls_against_the_integral_over_a_cap():
+    # Over a cap beyond the cosine c about e, the mean of n nᵀ along e is (1 + c + c²) / 3.
+    r, s, d = 0.5, 0.6, 0.8
+    c = (d * d + r * r - s * s) / (2 * d * r)
+    area = 2 * np.pi * r * r * (1 - c)
+    ahead = area * (1 + c + c * c) / 3
+    found = overlap(Ellipsoid((r, r, r)), Placed(Sphere(s), (0, d, 0))).shape_gradient
+    assert_allclose(found[0], [(area - ahead) / 2, ahead, (area - ahead) / 2], rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["capsule", "cylinder", "box", "ellipsoid"])
+def test_euler_holds_for_pairs_with_an_ellipsoid_at_any_depth(kind):
+    rng = np.random.default_rng(4)
+    make, numbers = BESIDE_ELLIPSOIDS[kind]
+    for depth in (0.3, 1e-2, 1e-5, 1e-8):
+        ahead, turn = rng.normal(size=3), quaternion(rng)
+        ahead /= np.linalg.norm(ahead)
+        low, high = 0.0, 5.0
+        for _ in range(50):
+            middle = (low + high) / 2
+            one = overlap(Ellipsoid(HALF_AXES), Placed(make(*numbers), middle * ahead, turn))
+            low, high = (middle, high) if one and one.depth > depth else (low, middle)
+        found = overlap(Ellipsoid(HALF_AXES), Placed(make(*numbers), low * ahead, turn))
+        stated = found.errors.shape_gradient
+        sizes = found.shape_gradient[0] @ HALF_AXES + found.shape_gradient[1, : len(numbers)] @ numbers
+        off = abs(sizes + found.gradient[0, :3] @ (-low * ahead) - 3 * found.volume)
+        bound = stated[0] @ HALF_AXES + stated[1, : len(numbers)] @ numbers + 3 * found.volume_error
+        assert off <= bound + low * found.errors.gradient[0, 0]
+        assert off <= 1e-7 * found.area
+
+
+def test_ellipsoids_in_groups_have_no_derivative():
+    assert np.isnan(overlap(Ellipsoid((1, 1, 2)), Sphere(1.0), Box((1, 1, 1))).shape_gradient[0]).all()
 
 
 @pytest.mark.parametrize("case", [case for case in PAIRS if case.truth.dimension == 3], ids=repr)

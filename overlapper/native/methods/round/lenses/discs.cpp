@@ -171,8 +171,13 @@ std::array<double, 4> Discs::ends() const {
   return {a[0], a[1], b[0], b[1]};
 }
 
+Mat3 Discs::moved_along_axes(const Mat3& moved) const {
+  const Mat3 axes = transposed({normal, x, y});
+  return axes * moved * transposed(axes);
+}
+
 Vec3 Discs::moment(const Mat3& moved, const quadric::Stretch& stretch) const {
-  const Mat3 axes = transposed({normal, x, y}), w = axes * moved * transposed(axes);
+  const Mat3 w = moved_along_axes(moved);
   const Vec3 h = stretch.half_axes, c = stretch.cofactors;
   return {h.y * c.z * w.row1.z - h.z * c.y * w.row2.y, h.z * c.x * w.row2.x - h.x * c.z * w.row0.z,
           h.x * c.y * w.row0.y - h.y * c.x * w.row1.x};

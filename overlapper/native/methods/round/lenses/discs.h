@@ -113,6 +113,8 @@ struct Discs {
 
   /// A vector across the slices and in their plane, along the axes of the first body.
   Vec3 along_axes(Vec3 v) const { return v.x * normal + v.y * x + v.z * y; }
+  /// ∫ y Nᵀ dA along the axes of the first body, from that in the slices' axes.
+  Mat3 moved_along_axes(const Mat3& moved) const;
   /// ∫ x × n dA of the stretched ball's surface along its axes, from ∫ y Nᵀ dA of the ball in the slices' axes.
   Vec3 moment(const Mat3& moved, const quadric::Stretch& stretch) const;
   Line first_centre() const { return {centre.start - share * apart.start, centre.slope - share * apart.slope}; }

@@ -2,12 +2,20 @@
 
 #include "geometry/scratch.h"
 #include "methods/round/lenses/lenses.h"
+#include "methods/round/pieces/planar_part.h"
 #include "methods/round/pieces/stretched.h"
 
 namespace overlapper::lenses {
 
 std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& pair) {
-  const bool swapped = stretched(pair.b.shape) != nullptr;
+  // A ball may be in the ellipsoid's place.
+  const auto half_axes = [](const Placed& body) {
+    if (const Ellipsoid* own = stretched(body.shape)) return std::optional(own->half_axes);
+    const auto round = revolution(body.shape);
+    return round && round->round_ends && round->half_length == 0 ? std::optional(round->radius * Vec3{1, 1, 1})
+                                                                 : std::nullopt;
+  };
+  const bool swapped = stretched(pair.b.shape) || !half_axes(pair.a);
   const Placed &other = swapped ? pair.a : pair.b, &ellipsoid = swapped ? pair.b : pair.a;
   const Scratch<pieces::StretchedPieces> scratch;
   auto& [of_other, of_ellipsoid] = *scratch;
@@ -18,9 +26,10 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
   pieces::cut(other, ellipsoid, many ? &common : nullptr, 1, pair.reference, pair.inside, of_other);
   pieces::cut(ellipsoid, other, nullptr, 0, pair.reference, pair.inside, of_ellipsoid);
   if (pair.outwards != 0 && !pieces::grow(of_other, pair.outwards)) return std::nullopt;
-  const Vec3 h = stretched(ellipsoid.shape)->half_axes;
+  const Vec3 h = *half_axes(ellipsoid);
   pieces::into_ball(ellipsoid, h, of_other);
   pieces::into_ball(ellipsoid, h, of_ellipsoid);
+  of_ellipsoid.rounds[0].radius = 1;
   const Mat3& turn = ellipsoid.pose.rotation;
   const quadric::Stretch stretch(h);
   const double misplaced = of_other.misplaced() + of_ellipsoid.rounding;
@@ -42,9 +51,15 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
     const slicing::Round* round = number < 0 ? nullptr : &of_other.rounds[number];
     const std::span<const slicing::Wall> walls = of_other.of(static_cast<int>(i));
     if (round && contains_part(in, *round, walls)) round = nullptr, contained = true;
+    const double before = sums.totals.volume;
     if (round ? !add_part(in, *round, walls, sums)
               : !pieces::add_ball_in_walls(of_ellipsoid.rounds, walls, setting, sums))
       return std::nullopt;
+    if (pair.moved && !round) {
+      const double more = sums.totals.volume - before;
+      const Mat3 flat = pieces::moved_by_walls(of_ellipsoid.rounds[0], walls);
+      if (more > 0) in.ball_moved = in.ball_moved + (Mat3{{more, 0, 0}, {0, more, 0}, {0, 0, more}} - flat);
+    }
   }
   const pieces::Totals& totals = sums.totals;
   const double volume = totals.volume,
@@ -59,6 +74,7 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
   pieces::OfBall of{totals, error, misplaced, in.moved, {}};
   if (contained && in.moved == 0) of.moved = std::nullopt;
   pieces::RoundMeasures result = pieces::in_world(of, pair, ellipsoid, stretch, swapped);
+  if (pair.moved) pair.set_moved(stretch.moved(in.ball_moved), turn, result.volume, swapped);
   result.area_error += of_other.gap_area;
   result.area_known = pair.with_area;
   return result;

@@ -100,6 +100,8 @@ std::optional<RoundMeasures> measure_lenses(const SlicedPair& pair) {
   const double side = swapped ? -1 : 1;
   result.pull = about({side * to.area_vector(sums.force), side * (to.turn * found->moment(sums.moved, to.stretch))},
                       rounded(pair.inside), {});
+  if (pair.moved)
+    pair.set_moved(to.stretch.moved(found->moved_along_axes(sums.moved)), to.turn, result.volume, swapped);
   result.area_known = pair.with_area;
   if (pair.with_area) {
     result.area = sums.first_area + sums.second_area;

@@ -19,7 +19,7 @@ namespace overlapper::lenses {
 std::optional<pieces::RoundMeasures> measure_lenses(const pieces::SlicedPair& pair);
 
 /// An ellipsoid and a capsule, a cylinder or a rounded hull. Each part of the other body is a part of a ball or of a
-/// cylinder inside planes, or a polytope.
+/// cylinder inside planes, or a polytope. The ellipsoid may be a ball.
 std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& pair);
 
 /// The rounding of all terms of a slack, and of all sums of slices, in units of the last bit.
@@ -33,7 +33,8 @@ struct InEllipsoid {
   double misplaced = 0;  ///< of surfaces, by double-doubles
   bool with_area = true;
   std::optional<View> view = {};
-  double moved = 0;  ///< m: bound of the movement of surfaces by rounding, set by add_part()
+  double moved = 0;             ///< m: bound of the movement of surfaces by rounding, set by add_part()
+  Mat3 ball_moved{{}, {}, {}};  ///< ∫ y Nᵀ dA over the ball's parts, added to by add_part()
 };
 
 /// Whether a ball or a cylinder contains all of the ellipsoid that is inside walls, and more: a ball about the disc

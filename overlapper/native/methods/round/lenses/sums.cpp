@@ -37,9 +37,6 @@ double bulge(const Arc& a) {
   return x * x * x * quadric::series(quadric::kSegmentSeries.bulge, x * x);
 }
 
-Mat3 outer(Vec3 a, Vec3 b) { return {a.x * b, a.y * b, a.z * b}; }
-Mat3 operator+(const Mat3& a, const Mat3& b) { return {a.row0 + b.row0, a.row1 + b.row1, a.row2 + b.row2}; }
-
 /// A slice, with the data for its parts. Vectors have one component across the slices, then two in the plane.
 struct Place {
   const Discs& discs;

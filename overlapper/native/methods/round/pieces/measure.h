@@ -41,6 +41,16 @@ struct SlicedPair {
   int owner = 0;               ///< the body whose surface the patch sums
   PatchSums* patch = nullptr;  ///< added to, if not null; relative to `inside`
   std::optional<CountedSurface> counted = {};  ///< only for balls, capsules, cylinders, rounded hulls and polyhedra
+  Mat3* moved = nullptr;  ///< set to ∫ x nᵀ dA over the first body's part of the surface about `inside`, if not null;
+                          ///< only for an ellipsoid with a smooth body
+
+  /// Sets `moved` from the sum over one body's part along the axes of `turn`. Over all of the surface, the sum is the
+  /// volume times the identity.
+  void set_moved(const Mat3& own, const Mat3& turn, double volume, bool of_second) const {
+    const Mat3 of_body = turn * own * transposed(turn);
+    const Mat3 whole{{volume, 0, 0}, {0, volume, 0}, {0, 0, volume}};
+    *moved = of_second ? whole - of_body : of_body;
+  }
 };
 
 /// Both bodies are cut into pieces: the parts of a ball or a cylinder, or of no round shape, within planes. Slices are

@@ -36,6 +36,12 @@ struct Stretch {
   /// place × normal, in the world along the axes.
   Vec3 moment(Vec3 place, Vec3 n) const { return cross(scaled(half_axes, place), normal(n)); }
 
+  /// The image of ∫ x nᵀ dA.
+  Mat3 moved(const Mat3& of_ball) const {
+    return {half_axes.x * scaled(cofactors, of_ball.row0), half_axes.y * scaled(cofactors, of_ball.row1),
+            half_axes.z * scaled(cofactors, of_ball.row2)};
+  }
+
   /// The surface between two parallel planes, per height of the strip, along the arc level + cos φ across + sin φ along
   /// of the unit ball, |φ| <= half_angle.
   double arc(Vec3 level, Vec3 across, Vec3 along, double half_angle) const;
