@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "geometry/cancellation.h"
+#include "overlap/facet_sections.h"
 #include "overlap/shape_gradient.h"
 
 namespace overlapper {
@@ -29,16 +30,16 @@ void cut_off(Polygon& polygon, Vec3 inwards, Vec3 from, Polygon& kept) {
 /// A facet's fan of triangles, and integrals over polygons in them.
 class HullSurface {
  public:
-  /// Coordinates are about the origin of the region's frame.
-  HullSurface(const Placed& body, const Region& region) : hull_(*polytope_of(body.shape)) {
-    const Placed relative = body.seen_from(region.reference);
+  /// Coordinates are about an origin, seen from the reference.
+  HullSurface(const Placed& body, Vec3 reference, Vec3 origin) : hull_(*polytope_of(body.shape)) {
+    const Placed relative = body.seen_from(reference);
     for (Vec3 v : hull_.vertices) {
-      vertices_.push_back(relative.pose * v - region.frame.origin);
+      vertices_.push_back(relative.pose * v - origin);
       reach_ = std::max(reach_, norm(vertices_.back()));
     }
     for (const Plane& own : hull_.planes) {
       const Plane plane = relative.pose * own;
-      planes_.push_back({plane.normal, -signed_distance(plane, region.frame.origin)});
+      planes_.push_back({plane.normal, -signed_distance(plane, origin)});
     }
     gradient_.resize(vertices_.size()), moved_.resize(vertices_.size()), area_.resize(vertices_.size());
   }
@@ -57,6 +58,15 @@ class HullSurface {
     for (size_t f = 0; f < planes_.size(); ++f)
       if (off[f] <= 2 * nearest + kRounding * reach_) add_in_facet(static_cast<int>(f), polygon);
   }
+
+  /// Adds a part of a triangle, with its area and ∫ x dA.
+  void add(const FacetSection& section) {
+    const double twice = dot(twice_area(section.corners), section.normal);
+    const Vec3 first = section.first - section.area * vertices_[section.corners[0]];
+    if (twice > 0) add_shares(section.corners, section.normal, twice, section.area, first);
+  }
+
+  double reach() const { return reach_; }
 
   /// Adds the difference of the sum from the area vector of the body's part to the errors.
   VertexGradient found(Vec3 force, double owned, double misplaced, bool with_errors) const {
@@ -81,9 +91,14 @@ class HullSurface {
     }
   }
 
+  Vec3 twice_area(const std::array<int, 3>& corners) const {
+    const Vec3 start = vertices_[corners[0]];
+    return cross(vertices_[corners[1]] - start, vertices_[corners[2]] - start);
+  }
+
   void add_in_triangle(const std::array<int, 3>& corners, Vec3 normal, const Polygon& polygon) {
     const auto at = [&](int k) { return vertices_[corners[k % 3]]; };
-    const double twice = dot(cross(at(1) - at(0), at(2) - at(0)), normal);
+    const double twice = dot(twice_area(corners), normal);
     if (!(twice > 0)) return;
     part_ = polygon;
     for (int k = 0; k < 3; ++k) cut_off(part_, cross(normal, at(k + 1) - at(k)), at(k), spare_);
@@ -93,7 +108,12 @@ class HullSurface {
       const double piece = dot(cross(part_[i] - part_[0], part_[i + 1] - part_[0]), normal) / 2;
       area += piece, first += piece / 3 * ((part_[0] - at(0)) + (part_[i] - at(0)) + (part_[i + 1] - at(0)));
     }
-    if (!(area > 0)) return;
+    if (area > 0) add_shares(corners, normal, twice, area, first);
+  }
+
+  /// Adds a part of a triangle, with its area and ∫ x dA about the first corner.
+  void add_shares(const std::array<int, 3>& corners, Vec3 normal, double twice, double area, Vec3 first) {
+    const auto at = [&](int k) { return vertices_[corners[k % 3]]; };
     double longest = 0;
     for (int k = 0; k < 3; ++k) longest = std::max(longest, norm(at(k + 1) - at(k)));
     // Barycentric coordinates, integrated: each is the distance from the side across the corner, over the height.
@@ -115,12 +135,29 @@ class HullSurface {
   Polygon part_, spare_;
 };
 
+Vec3 force_of(const Overlap& overlap, int body) {
+  const auto row = overlap.gradient()[body];
+  return {row[0], row[1], row[2]};
+}
+
+VertexGradient in_round_body(const Overlap& overlap, int body, bool with_errors) {
+  const Vec3 reference = overlap.centroid();
+  HullSurface surface(overlap.bodies()[body], reference, {});
+  double owned = with_errors ? overlap.errors().gradient[body][0] : 0;
+  for (const FacetSection& section : facet_sections(overlap, body, reference)) {
+    surface.add(section);
+    owned += section.error;
+  }
+  return surface.found(force_of(overlap, body), owned, 16 * DBL_EPSILON * surface.reach(), with_errors);
+}
+
 }  // namespace
 
 std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_errors) {
   const std::span<const Placed> bodies = overlap.bodies();
   std::vector<VertexGradient> found(bodies.size());
-  const bool overlapping = overlap.status() == Status::kOverlapping, known = polyhedral(bodies);
+  const bool overlapping = overlap.status() == Status::kOverlapping, flat = polyhedral(bodies);
+  const bool known = flat || overlap.pair();
   for (size_t i = 0; i < bodies.size(); ++i) {
     if (smooth(bodies[i].shape) || !polytope_of(bodies[i].shape)) continue;
     const size_t count = polytope_of(bodies[i].shape)->vertices.size();
@@ -128,8 +165,12 @@ std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_e
     found[i].by_vertex.assign(count, {value, value, value});
     if (with_errors) found[i].error.assign(count, overlapping ? value : overlap.errors().gradient[i][0]);
     if (!known || !overlapping) continue;
+    if (!flat) {
+      found[i] = in_round_body(overlap, static_cast<int>(i), with_errors);
+      continue;
+    }
     const Region& region = overlap.drawn();
-    HullSurface surface(bodies[i], region);
+    HullSurface surface(bodies[i], region.reference, region.frame.origin);
     Polygon polygon;
     for (int f = 0; f < region.polytope.facets(); ++f) {
       if (region.facets[f].owner != static_cast<int>(i)) continue;
@@ -137,10 +178,9 @@ std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_e
       for (int v : region.polytope.facet(f)) polygon.push_back(region.frame.axes * region.polytope.vertices[v]);
       surface.add(polygon, region.facets[f].normal);
     }
-    const auto force = overlap.gradient()[i];
     const double owned = with_errors ? overlap.errors().gradient[i][0] : 0;
-    found[i] =
-        surface.found({force[0], force[1], force[2]}, owned, with_errors ? overlap.errors().vertices : 0, with_errors);
+    const double misplaced = with_errors ? overlap.errors().vertices : 0;
+    found[i] = surface.found(force_of(overlap, static_cast<int>(i)), owned, misplaced, with_errors);
   }
   return found;
 }

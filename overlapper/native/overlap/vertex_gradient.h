@@ -12,8 +12,8 @@ struct VertexGradient {
   std::vector<double> error;    ///< m²: bound of the length of the error of each; empty unless wanted
 };
 
-/// For each body, the derivatives by the vertices of its hull. No vertices for a body that is no hull. NaN if the hull
-/// overlaps a round body.
+/// For each body, the derivatives by the vertices of its hull. No vertices for a body that is no hull. NaN for groups
+/// with a round body.
 ///
 /// If a vertex moves, points of its facets move along with their barycentric coordinates. The derivative is the
 /// integral of a vertex's coordinate times the normal over the part of the surface that the body owns. A facet of more

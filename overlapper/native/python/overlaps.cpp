@@ -248,8 +248,8 @@ with an ellipsoid that cannot be sliced. Zeros unless overlapping. `errors.shape
       R"(For each body, the (k, 3) d volume / d (position of a vertex), world axes, m², of the rows of `Hull.vertices`; None
 for a body that is no hull. The vertices of a body have the sum gradient[i, :3]. A facet of more than three corners counts as
 a fan of triangles from its first corner. The volume has other one-sided derivatives there, as a vertex that leaves the facet
-may fold it in another way. NaN if the hull overlaps a round body; zeros unless overlapping. `errors.vertex_gradients` bounds
-the errors.)");
+may fold it in another way. NaN in groups with a round body; zeros unless overlapping. `errors.vertex_gradients` bounds the
+errors.)");
 }
 
 /// The error bounds of an overlap.

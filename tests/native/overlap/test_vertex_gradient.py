@@ -11,7 +11,20 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from strategies import quaternion
 
-from overlapper import Box, HalfSpace, Hull, Placed, Sphere, overlap, random_polytope
+from overlapper import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Placed,
+    RoundedHull,
+    Sphere,
+    overlap,
+    penetration_depth,
+    random_polytope,
+)
 
 
 def by_vertices(case, body):
@@ -124,6 +137,76 @@ def test_vertices_that_the_other_body_does_not_reach():
     assert reached[hull.vertices[:, 2] < 0].all() and not reached.all()
     assert not overlap(hull, Placed(hull, (9, 0, 0))).vertex_gradients[1].any()
     assert overlap(hull, Placed(hull, (9, 0, 0))).errors.vertex_gradients[0].shape == (len(hull.vertices),)
-    assert np.isnan(overlap(hull, Sphere(0.5)).vertex_gradients[0]).all()
-    assert np.isnan(overlap(hull, Sphere(0.5)).errors.vertex_gradients[0]).all()
+    group = overlap(hull, Sphere(0.5), Box((1, 1, 1)))
+    assert np.isnan(group.vertex_gradients[0]).all() and np.isnan(group.errors.vertex_gradients[0]).all()
     assert overlap(Sphere(1), Box((1, 1, 1))).vertex_gradients == [None, None]
+
+
+ROUND = {
+    "sphere": Sphere(0.5),
+    "capsule": Capsule(0.3, 0.8),
+    "cylinder": Cylinder(0.4, 0.7),
+    "ellipsoid": Ellipsoid((0.5, 0.3, 0.4)),
+    "rounded hull": RoundedHull(random_polytope(8, rng=3).vertices * 0.3, 0.2),
+}
+HULLS = {
+    "triangles": random_polytope(14, rng=1).vertices * 0.7,
+    "cube": np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]),
+}
+
+
+@pytest.mark.parametrize("kind", ROUND)
+def test_vertices_in_a_round_body_against_differences_of_volumes(kind):
+    # Random hulls have triangles: a vertex that moves folds no facet.
+    hull = Hull(HULLS["triangles"])
+    body = Placed(ROUND[kind], (0.3, 0.25, -0.2), (0.3, -0.2, 0.5, 0.7))
+    found, step = overlap(hull, body), 1e-5
+    for v in range(len(hull.vertices)):
+        for axis in range(3):
+            by = step * np.eye(3)[axis] * (np.arange(len(hull.vertices)) == v)[:, None]
+            volumes = [overlap(Hull(hull.vertices + side * by), body).volume for side in (-1, 1)]
+            slope = (volumes[1] - volumes[0]) / (2 * step)
+            assert found.vertex_gradients[0][v, axis] == pytest.approx(slope, abs=2e-9)
+
+
+@pytest.mark.parametrize("name", HULLS)
+@pytest.mark.parametrize("kind", ROUND)
+def test_vertices_in_a_round_body_add_up_to_force_and_moment(kind, name):
+    # The force and the moment come from slices or closed forms, at depths from half of the body to 1e-8 of it.
+    rng = np.random.default_rng(7)
+    hull = Hull(HULLS[name])
+    for depth in (0.2, 1e-2, 1e-5, 1e-8):
+        for turn in ((0, 0, 0, 1), quaternion(rng)):
+            ahead = rng.normal(size=3)
+            ahead /= np.linalg.norm(ahead)
+            low, high = 0.0, 5.0
+            for _ in range(50):
+                middle = (low + high) / 2
+                deep = penetration_depth(hull, Placed(ROUND[kind], middle * ahead, turn)) > depth
+                low, high = (middle, high) if deep else (low, middle)
+            found = overlap(hull, Placed(ROUND[kind], low * ahead, turn))
+            vertices, stated = found.vertex_gradients[0], found.errors.vertex_gradients[0]
+            off = vertices.sum(0) - found.gradient[0, :3]
+            turning = np.cross(hull.vertices, vertices).sum(0) - found.gradient[0, 3:]
+            assert np.isfinite(vertices).all() and (stated >= np.linalg.norm(off)).all()
+            assert np.linalg.norm(off) <= 1e-6 * found.area and np.linalg.norm(turning) <= 1e-6 * found.area
+            assert stated.max() <= 1e-4 * found.area
+
+
+def test_a_hull_and_an_ellipsoid_that_are_stretched_together():
+    # Along each axis of both, the volume has the degree 1 in their sizes.
+    rng = np.random.default_rng(8)
+    for points in HULLS.values():
+        hull, half_axes = Hull(points + rng.uniform(-0.3, 0.3, 3)), rng.uniform(0.3, 0.8, 3)
+        found = overlap(hull, Ellipsoid(half_axes))
+        along = (hull.vertices * found.vertex_gradients[0]).sum(0) + half_axes * found.shape_gradient[1]
+        assert_allclose(along, np.full(3, found.volume), rtol=1e-11)
+
+
+def test_a_hull_around_a_round_body_or_within_it():
+    hull = Hull(HULLS["triangles"])
+    for body in ROUND.values():
+        assert not overlap(Hull(hull.vertices * 20), body).vertex_gradients[0].any()
+    within = overlap(hull, Placed(Sphere(5.0), (0.5, 0.2, 0)))
+    expected = overlap(hull, Box((5, 5, 5))).vertex_gradients[0]
+    assert_allclose(within.vertex_gradients[0], expected, rtol=0, atol=1e-14)
