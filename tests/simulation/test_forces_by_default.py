@@ -10,7 +10,7 @@ from contact_experiments import World
 
 import overlapper.mujoco
 from overlapper.simulation import Bodies, VolumetricContact
-from overlapper.simulation.cautions import DepthWarning
+from overlapper.simulation.cautions import DepthWarning, UnsettledWarning
 from overlapper.simulation.forces.parameter import resting_stiffness
 
 G = 9.81
@@ -133,3 +133,38 @@ def test_rolling_friction_of_mujoco_acts_in_contacts_of_six_dimensions():
         speeds.append(data.qvel[0])
     seconds = 250 * 0.002
     assert speeds[0] - speeds[1] == pytest.approx(5 / 7 * G * 1e-3 / 0.05 * seconds, rel=0.05)
+
+
+STANDING = (0.0, 0.9, -1.8) * 4
+
+
+@pytest.mark.parametrize(
+    ("file", "height", "turn", "angles"),
+    [
+        ("laikago/laikago_toes.urdf", 0.48, (0, 0.5, 0.5, 0), (0.0,) * 12),
+        ("a1/a1.urdf", 0.32, (0, 0, 0, 1), STANDING),
+        ("mini_cheetah/mini_cheetah.urdf", 0.3, (0, 0, 0, 1), (0.0, -0.8, 1.6) * 4),
+    ],
+)
+def test_forces_on_a_robot_that_lands_are_settled_in_every_substep(client, file, height, turn, angles):
+    """Solved again at one pose, they are the same to 1e-8 of the largest."""
+    p.setGravity(0, 0, -G, physicsClientId=client)
+    p.loadURDF("plane.urdf", physicsClientId=client)
+    robot = p.loadURDF(file, [0, 0, height], turn, physicsClientId=client)
+    count = p.getNumJoints(robot, physicsClientId=client)
+    kinds = [p.getJointInfo(robot, joint, physicsClientId=client)[2] for joint in range(count)]
+    joints = [joint for joint, kind in enumerate(kinds) if kind == p.JOINT_REVOLUTE]
+    for joint, angle in zip(joints, angles):
+        p.resetJointState(robot, joint, angle, physicsClientId=client)
+    with VolumetricContact(Bodies(client)) as contact, warnings.catch_warnings():
+        warnings.simplefilter("error", UnsettledWarning)
+        for _ in range(100):
+            for joint, angle in zip(joints, angles):
+                p.setJointMotorControl2(robot, joint, p.POSITION_CONTROL, angle, force=33, physicsClientId=client)
+            contact.step()
+            assert contact.residual <= 1e-8 and contact.sweeps <= 40
+        first = contact.forces()
+        assert len(first) >= 2
+        for _ in range(12):
+            again = contact.forces()
+            assert again.force == pytest.approx(first.force, rel=0, abs=1e-8 * np.abs(first.force).max())

@@ -3,7 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
+#include <optional>
 #include <utility>
+
+#include "forces/block_system.h"
+#include "forces/linear.h"
 
 namespace overlapper {
 namespace {
@@ -17,8 +22,23 @@ constexpr int kVisits = 10000;
 constexpr int kFewest = 10;
 constexpr int kMost = 2000;
 
-/// Wrenches are extrapolated from this sweep on.
-constexpr int kPlain = 8;
+/// A step of Newton's method follows each sweep from this one on.
+constexpr int kPlain = 4;
+
+/// Newton's method is for islands of at most so many coordinates. Elimination takes too much time for larger ones.
+constexpr int kUnknowns = 300;
+
+/// After so many steps of Newton's method times the number of coordinates, sweeps go on alone.
+constexpr int kWork = 60000;
+
+/// The most steps of Newton's method between two sweeps. If they are not enough, what they did is undone.
+constexpr int kSteps = 12;
+
+/// How much sticking forces give way at first, and in the end.
+constexpr double kGive = 1e-2, kLeastGive = 1e-9;
+
+/// A search along a step ends when the power is less than this part of the power at its beginning.
+constexpr double kSearched = 0.1;
 
 /// The axis of a rotation times its angle in rad. NaN above a third of a turn, where rounding would matter.
 Vec3 rotation_vector(const Mat3& turn) {
@@ -35,9 +55,10 @@ struct ContactSolver::Laws {
   PatchFriction friction;
   Six wrench;  ///< of pressures, friction and rolling resistance
   Drift drift;
-  Three rolling{};              ///< the part of the rolling resistance, normal
-  double shift = 0;             ///< of the rolling resistance, see opposing()
-  double relative_damping = 0;  ///< N, see find_relative_damping()
+  std::optional<Coulomb> rolling{};  ///< normal
+  double relative_damping = 0;       ///< N, see find_relative_damping()
+
+  Three pressures() const { return rolling ? wrench.normal - rolling->wrench() : wrench.normal; }
 };
 
 ContactSolver::Row::Row(const ElasticPatch& patch)
@@ -132,17 +153,14 @@ void ContactSolver::share_damping() {
 }
 
 /// The damping by the motion of other patches relative to each patch, in N. It is 0 for patches that are damped alone.
-void ContactSolver::find_relative_damping(std::span<const double> velocity, std::span<Laws> laws) const {
-  std::vector<double> slip;
-  for (size_t i = 0; i < rows_.size(); ++i) {
-    if (rows_[i].damped_with.empty()) continue;
-    if (slip.empty()) {
-      slip.resize(rows_.size());
-      for (size_t j = 0; j < rows_.size(); ++j)
-        if (!rows_[j].damped_with.empty()) slip[j] = slip_of(rows_[j], velocity).normal[0];
-    }
+void ContactSolver::find_relative_damping(const Island& island, std::span<const double> velocity,
+                                          std::span<Laws> laws) const {
+  for (int i : island.patches) {
     laws[i].relative_damping = 0;
-    for (const auto [other, part] : rows_[i].damped_with) laws[i].relative_damping += part * (slip[other] - slip[i]);
+    if (rows_[i].damped_with.empty()) continue;
+    const double own = slip_of(rows_[i], velocity).normal[0];
+    for (const auto [other, part] : rows_[i].damped_with)
+      laws[i].relative_damping += part * (slip_of(rows_[other], velocity).normal[0] - own);
   }
 }
 
@@ -323,59 +341,363 @@ Pressure::Damping ContactSolver::damping(size_t patch, std::span<const Six> befo
 double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const {
   const Row& row = rows_[patch];
   const Six slip = slip_of(row, velocity), last = laws.wrench;
-  const Three pressures = last.normal - laws.rolling;
-  const Three without = slip.normal - duration * (row.normal_by_normal * pressures);
-  laws.wrench.normal = laws.pressure.answer(without, laws.relative_damping) + laws.rolling;
-  if (patches_[patch].rolling > 0) {
-    const Three pressed = laws.wrench.normal - last.normal;
-    roll(patch, laws, duration, slip.normal + duration * (row.normal_by_normal * pressed));
+  const Three pressures = laws.pressures(), without = slip.normal - duration * (row.normal_by_normal * pressures);
+  const Three pressed = laws.pressure.answer(without, laws.relative_damping);
+  laws.wrench.normal = pressed;
+  if (laws.rolling) {
+    laws.rolling->answer(slip.normal + duration * (row.normal_by_normal * (pressed - pressures)), pressed[0]);
+    laws.wrench.normal = pressed + laws.rolling->wrench();
   }
-  const Three pressed = laws.wrench.normal - last.normal;
-  const Three tangential = slip.tangential + laws.drift.slip + duration * (row.tangential_by_normal * pressed);
-  laws.wrench.tangential = laws.friction.answer(tangential, last.tangential, laws.wrench.normal[0]);
-  const Six change{pressed, laws.wrench.tangential - last.tangential};
+  const Three normal = laws.wrench.normal - last.normal;
+  const Three tangential = slip.tangential + laws.drift.slip + duration * (row.tangential_by_normal * normal);
+  laws.wrench.tangential = laws.friction.answer(tangential, pressed[0]);
+  const Six change{normal, laws.wrench.tangential - last.tangential};
   push(row, change, duration, velocity);
-  const Three normal = row.normal_by_normal * change.normal + row.normal_by_tangential * change.tangential;
-  const Three along = row.tangential_by_normal * change.normal + row.tangential_by_tangential * change.tangential;
-  return duration * std::max({std::abs(normal[0]), std::abs(along[0]), std::abs(along[1])});
+  const Six moved = response(row, change);
+  return duration * std::max({std::abs(moved.normal[0]), std::abs(moved.tangential[0]), std::abs(moved.tangential[1])});
 }
 
-/// Updates the rolling resistance: Coulomb's law for the two angular velocities of `slip`, a normal part.
-void ContactSolver::roll(size_t patch, Laws& laws, double duration, const Three& slip) const {
-  ThreeByThree mobility = duration * rows_[patch].normal_by_normal;
-  const Three had = laws.rolling, pressure = laws.wrench.normal - had;
-  const Three free = slip - mobility * had;
-  mobility[0] = {1, 0, 0}, mobility[1][0] = mobility[2][0] = 0;
-  laws.rolling = opposing(mobility, {0, free[1], free[2]}, patches_[patch].rolling * pressure[0], laws.shift);
-  laws.wrench.normal = pressure + laws.rolling;
+ContactSolver::Six ContactSolver::response(const Row& row, const Six& wrench) {
+  return {row.normal_by_normal * wrench.normal + row.normal_by_tangential * wrench.tangential,
+          row.tangential_by_normal * wrench.normal + row.tangential_by_tangential * wrench.tangential};
 }
 
-/// Extrapolates the wrenches after a sweep there and back (Nesterov 1983). It begins anew when the sweeps go against
-/// the extrapolation (O'Donoghue and Candès 2015). The next visits replace the wrenches, so these need not obey the
-/// laws. Without extrapolation, patches of one body that cannot all stick need thousands of sweeps. Each sweep adds the
-/// same small wrench to those by which the patches hold each other, until one patch slides.
-void ContactSolver::extrapolate(Momentum& momentum, std::span<Laws> laws, double duration,
-                                std::span<double> velocity) const {
-  auto& [before, begun, weight] = momentum;
-  double against = before.empty() ? 1 : 0;
-  for (size_t i = 0; i < before.size(); ++i)
-    for (int k = 0; k < 3; ++k) {
-      const Six &now = laws[i].wrench, &last = before[i], &from = begun[i];
-      against += rows_[i].normal_by_normal[k][k] * (from.normal[k] - now.normal[k]) * (now.normal[k] - last.normal[k]);
-      against += rows_[i].tangential_by_tangential[k][k] * (from.tangential[k] - now.tangential[k]) *
-                 (now.tangential[k] - last.tangential[k]);
-    }
-  before.resize(laws.size()), begun.resize(laws.size());
-  if (against > 0) weight = 1;
-  const double next = (1 + std::sqrt(1 + 4 * weight * weight)) / 2, factor = (weight - 1) / next;
-  weight = next;
-  for (size_t i = 0; i < laws.size(); ++i) {
-    Six& wrench = laws[i].wrench;
-    const Six more{factor * (wrench.normal - before[i].normal), factor * (wrench.tangential - before[i].tangential)};
-    push(rows_[i], more, duration, velocity);
-    before[i] = wrench;
-    begun[i] = wrench = {wrench.normal + more.normal, wrench.tangential + more.tangential};
+std::vector<ContactSolver::Island> ContactSolver::islands() const {
+  const std::span<const Multibodies::Body> bodies = bodies_.bodies();
+  std::vector<int> root(bodies.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](int body) {
+    while (root[body] != body) body = root[body] = root[root[body]];
+    return body;
+  };
+  for (const Row& row : rows_)
+    if (row.sides_used == 2 && row.sides[0].moves && row.sides[1].moves)
+      root[find(row.sides[1].body)] = find(row.sides[0].body);
+  std::vector<Island> found;
+  std::vector<int> of_root(bodies.size(), -1);
+  for (int i = 0; i < int(rows_.size()); ++i) {
+    const Row& row = rows_[i];
+    const Side& side = row.sides[row.sides[0].moves ? 0 : row.sides_used - 1];
+    int alone = -1;  // nothing moves
+    int& island = side.moves ? of_root[find(side.body)] : alone;
+    if (island < 0) island = int(found.size()), found.emplace_back();
+    found[island].patches.push_back(i);
   }
+  for (int body = 0; body < int(bodies.size()); ++body)
+    if (const int island = of_root[find(body)]; island >= 0 && bodies[body].movable)
+      found[island].bodies.push_back(body);
+  return found;
+}
+
+/// Newton's method for all patches of an island at once. The unknowns are the changes of the velocities of its bodies,
+/// as these are few. Sticking forces give way a little from those before, so that the wrenches are functions of the
+/// velocities, see Coulomb::held. A few calls of `settle` leave nothing of that.
+class ContactSolver::Newton {
+ public:
+  Newton(const ContactSolver& solver, const Island& island)
+      : solver_(solver),
+        island_(island),
+        system_(sizes(solver, island), pairs(solver, island)),
+        patches_(island.patches.size()) {
+    moved_.resize(solver.bodies_.coordinates());
+  }
+
+  /// Finds wrenches and velocities that agree, such that the wrenches change slips by `enough` at most.
+  void settle(std::span<Laws> laws, double duration, double enough, std::span<double> velocity) {
+    const std::vector<double> begun(velocity.begin(), velocity.end());
+    bool agreed = false;
+    double last = INFINITY, last_but_one = INFINITY;
+    for (size_t k = 0; k < patches_.size(); ++k) {
+      const Laws& law = laws[island_.patches[k]];
+      patches_[k].begin = law.wrench, patches_[k].before = law.pressures();
+    }
+    for (int step = 0; step < kSteps; ++step) {
+      const double off = linearise(laws, duration, velocity);
+      ++steps_;
+      if (agreed = off <= enough; agreed) break;
+      system_.solve(right_);
+      // A patch without a derivative, as at the very edge of its area, makes a step useless.
+      if (!std::ranges::all_of(right_, [](double each) { return std::isfinite(each); })) break;
+      for (size_t b = 0; b < island_.bodies.size(); ++b) {
+        const Multibodies::Body& body = solver_.bodies_.bodies()[island_.bodies[b]];
+        std::copy_n(&right_[system_.first(int(b))], body.coordinates, &moved_[body.first_coordinate]);
+      }
+      find_changes();
+      // A step that leads back to where the last one began is halved.
+      const double part = search(laws) * (off > 0.9 * last_but_one ? 0.5 : 1);
+      last_but_one = last, last = off;
+      for (size_t k = 0; k < patches_.size(); ++k) {
+        const int i = island_.patches[k];
+        const Six& change = patches_[k].change;
+        laws[i].wrench = sum(laws[i].wrench, change, part);
+        solver_.push(solver_.rows_[i], change, part * duration, velocity);
+      }
+    }
+    for (size_t k = 0; k < patches_.size(); ++k) {
+      const int i = island_.patches[k];
+      const Six present = std::exchange(laws[i].wrench, agreed ? patches_[k].wrench : patches_[k].begin);
+      if (!agreed) continue;
+      solver_.push(solver_.rows_[i], sum(laws[i].wrench, present, -1), duration, velocity);
+      laws[i].friction.take();
+      if (laws[i].rolling) laws[i].rolling->take();
+    }
+    if (!agreed) std::ranges::copy(begun, velocity.begin());
+    give_ = agreed ? std::max(kLeastGive, give_ / tightening_) : std::min(1.0, give_ * 10);
+    if (!agreed) tightening_ = 2;
+  }
+
+  int steps() const { return steps_; }
+
+ private:
+  static double& at(Six& of, int k) { return k < 3 ? of.normal[k] : of.tangential[k - 3]; }
+  static double at(const Six& of, int k) { return k < 3 ? of.normal[k] : of.tangential[k - 3]; }
+
+  /// A patch in a step: slip and relative damping, the wrench by its laws, what is missing to it, and the changes.
+  struct OfPatch {
+    Six begin;  ///< the wrench at first, and its pressures
+    Three before;
+    Six slip;
+    double more = 0;
+    Six wrench, missing;
+    std::array<std::array<double, 6>, 6> by_slip{};
+    std::array<double, 6> by_damping{};
+    Six slip_change, change;
+    double more_change = 0;
+  };
+
+  static std::vector<int> sizes(const ContactSolver& solver, const Island& island) {
+    std::vector<int> found;
+    for (int body : island.bodies) found.push_back(solver.bodies_.bodies()[body].coordinates);
+    return found;
+  }
+
+  static std::vector<std::array<int, 2>> pairs(const ContactSolver& solver, const Island& island) {
+    std::vector<std::array<int, 2>> found;
+    for (int i : island.patches)
+      if (const Row& row = solver.rows_[i]; row.sides_used == 2 && row.sides[0].moves && row.sides[1].moves)
+        found.push_back({place(island, row.sides[0]), place(island, row.sides[1])});
+    return found;
+  }
+
+  static int place(const Island& island, const Side& side) {
+    return int(std::ranges::lower_bound(island.bodies, side.body) - island.bodies.begin());
+  }
+
+  /// The slip by each coordinate of a side: 6 rows.
+  void rows_of(const Row& row, const Side& side, std::vector<double>& rows) const {
+    const size_t n = side.coordinates;
+    if (!side.single) {
+      rows.assign(&solver_.pool_[side.rows], &solver_.pool_[side.rows] + 6 * n);
+      return;
+    }
+    rows.resize(6 * n);
+    for (int c = 0; c < 6; ++c) {
+      Vec3 axis{};
+      (c % 3 == 0 ? axis.x : c % 3 == 1 ? axis.y : axis.z) = side.sign;
+      const Six slip = row.local(c < 3 ? Screw{axis, {}} : Screw{cross(axis, side.arm), axis});
+      for (int i = 0; i < 3; ++i) rows[i * n + c] = slip.normal[i], rows[(i + 3) * n + c] = slip.tangential[i];
+    }
+  }
+
+  /// The change of each coordinate of a side by a wrench, in 1 s: rows of 6.
+  void answers_of(const Row& row, const Side& side, std::vector<double>& answers) const {
+    if (!side.single) {
+      answers.assign(&solver_.pool_[side.answers], &solver_.pool_[side.answers] + 6 * size_t(side.coordinates));
+      return;
+    }
+    answers.resize(36);
+    for (int k = 0; k < 6; ++k) {
+      Six unit;
+      (k < 3 ? unit.normal : unit.tangential)[k % 3] = side.sign;
+      const Screw moved = solver_.answer(side, row.world(unit));
+      for (int c = 0; c < 3; ++c) answers[c * 6 + k] = moved.along[c], answers[(c + 3) * 6 + k] = moved.about[c];
+    }
+  }
+
+  static Six sum(const Six& a, const Six& b, double part) {
+    return {a.normal + part * b.normal, a.tangential + part * b.tangential};
+  }
+
+  /// The wrench of a patch near a slip.
+  struct Near {
+    Linear pressed, rubbed, rolled;
+    Six wrench() const { return {pressed.value + rolled.value, rubbed.value}; }
+  };
+  Near near(Laws& laws, const Three& before, const Six& slip, double more) const {
+    Near found;
+    found.pressed = laws.pressure.held(slip.normal, more, give_, before, laws.pressures());
+    const double pressing = found.pressed.value[0];
+    found.rubbed = laws.friction.held(slip.tangential + laws.drift.slip, pressing, give_);
+    if (laws.rolling) found.rolled = laws.rolling->held(slip.normal, pressing, give_);
+    return found;
+  }
+
+  /// Makes the system for a step. Returns the largest change of a slip by a wrench that its law would give now.
+  double linearise(std::span<Laws> laws, double duration, std::span<const double> velocity) {
+    solver_.find_relative_damping(island_, velocity, laws);
+    system_.reset();
+    right_.assign(system_.unknowns(), 0.0);
+    double off = 0;
+    for (size_t k = 0; k < patches_.size(); ++k) {
+      const int i = island_.patches[k];
+      const Row& row = solver_.rows_[i];
+      OfPatch& of = patches_[k];
+      of.slip = solver_.slip_of(row, velocity), of.more = laws[i].relative_damping;
+      const Near found = near(laws[i], of.before, of.slip, of.more);
+      of.wrench = found.wrench();
+      of.missing = sum(of.wrench, laws[i].wrench, -1);
+      of.by_slip = {}, of.by_damping = {};
+      const auto put = [&](const Linear& part, int first) {
+        // Its other number is the pressing force.
+        for (int r = 0; r < 3; ++r) {
+          of.by_damping[first + r] += part.by_other[r] * found.pressed.by_other[0];
+          for (int c = 0; c < 3; ++c) {
+            of.by_slip[first + r][first + c] += part.by_slip[r][c];
+            of.by_slip[first + r][c] += part.by_other[r] * found.pressed.by_slip[0][c];
+          }
+        }
+      };
+      put(found.rubbed, 3);
+      put(found.rolled, 0);
+      for (int r = 0; r < 3; ++r) {
+        of.by_damping[r] += found.pressed.by_other[r];
+        for (int c = 0; c < 3; ++c) of.by_slip[r][c] += found.pressed.by_slip[r][c];
+      }
+      const Six moved = response(row, of.missing);
+      off = std::max({off, duration * std::abs(moved.normal[0]), duration * std::abs(moved.tangential[0]),
+                      duration * std::abs(moved.tangential[1])});
+      add(row, of, duration);
+    }
+    return off;
+  }
+
+  /// Finds the changes of slips and wrenches by the whole step.
+  void find_changes() {
+    for (size_t k = 0; k < patches_.size(); ++k) {
+      const Row& row = solver_.rows_[island_.patches[k]];
+      OfPatch& of = patches_[k];
+      of.slip_change = solver_.slip_of(row, moved_), of.more_change = 0;
+      for (const auto [other, part] : row.damped_with)
+        of.more_change += part * (solver_.slip_of(solver_.rows_[other], moved_).normal[0] - of.slip_change.normal[0]);
+      of.change = of.missing;
+      for (int r = 0; r < 6; ++r) {
+        double by = of.by_damping[r] * of.more_change;
+        for (int c = 0; c < 6; ++c) by += of.by_slip[r][c] * at(of.slip_change, c);
+        at(of.change, r) += by;
+      }
+    }
+  }
+
+  /// The part of the step after which the power of the wrenches that are missing is 0, or 1. Laws that take energy away
+  /// let this power grow along the step.
+  double search(std::span<Laws> laws) {
+    const auto power = [&](double part) {
+      double sum_of = 0;
+      for (size_t k = 0; k < patches_.size(); ++k) {
+        const int i = island_.patches[k];
+        const OfPatch& of = patches_[k];
+        const Six slip = sum(of.slip, of.slip_change, part);
+        const Six found = near(laws[i], of.before, slip, of.more + part * of.more_change).wrench();
+        for (int r = 0; r < 6; ++r)
+          sum_of += (at(laws[i].wrench, r) + part * at(of.change, r) - at(found, r)) * at(of.slip_change, r);
+      }
+      return sum_of;
+    };
+    double low = 0, high = 1, at_low = 0;
+    for (const OfPatch& of : patches_)
+      for (int r = 0; r < 6; ++r) at_low -= at(of.missing, r) * at(of.slip_change, r);
+    const double begin = std::abs(at_low);
+    double at_high = power(1);
+    if (!(at_low < 0) || !(at_high > kSearched * begin)) return 1;
+    double part = 1;
+    for (int k = 0; k < 12; ++k) {
+      // Regula falsi in the form of Illinois.
+      part = (low * at_high - high * at_low) / (at_high - at_low);
+      const double here = power(part);
+      if (std::abs(here) <= kSearched * begin) break;
+      if (here > 0) high = part, at_high = here, at_low /= 2;
+      else low = part, at_low = here, at_high /= 2;
+    }
+    return part;
+  }
+
+  /// Adds the change of a patch's wrench to the system.
+  void add(const Row& row, const OfPatch& of, double duration) {
+    std::array<int, 2> block_of{};
+    for (int s = 0; s < row.sides_used; ++s) {
+      const Side& side = row.sides[s];
+      if (!side.moves) continue;
+      block_of[s] = place(island_, side);
+      answers_of(row, side, answers_[s]);
+      for (int c = 0; c < side.coordinates; ++c)
+        for (int k = 0; k < 6; ++k)
+          right_[system_.first(block_of[s]) + c] += duration * answers_[s][c * 6 + k] * at(of.missing, k);
+    }
+    for (int t = 0; t < row.sides_used; ++t) {
+      const Side& side = row.sides[t];
+      if (!side.moves) continue;
+      const int n = side.coordinates;
+      rows_of(row, side, rows_);
+      wrench_.assign(size_t(6) * n, 0.0);
+      for (int r = 0; r < 6; ++r)
+        for (int k = 0; k < 6; ++k)
+          for (int c = 0; c < n; ++c) wrench_[r * n + c] += of.by_slip[r][k] * rows_[k * n + c];
+      for (const auto [other, part] : row.damped_with) {
+        rows_of(solver_.rows_[other], solver_.rows_[other].sides[t], others_);
+        for (int r = 0; r < 6; ++r)
+          for (int c = 0; c < n; ++c) wrench_[r * n + c] += of.by_damping[r] * part * (others_[c] - rows_[c]);
+      }
+      for (int s = 0; s < row.sides_used; ++s) {
+        if (!row.sides[s].moves) continue;
+        double* block = system_.at(block_of[s], block_of[t]);
+        for (int i = 0; i < row.sides[s].coordinates; ++i)
+          for (int k = 0; k < 6; ++k) {
+            const double factor = duration * answers_[s][i * 6 + k];
+            for (int c = 0; c < n; ++c) block[i * n + c] -= factor * wrench_[k * n + c];
+          }
+      }
+    }
+  }
+
+  const ContactSolver& solver_;
+  const Island& island_;
+  BlockSystem system_;
+  double give_ = kGive, tightening_ = 30;
+  int steps_ = 0;
+  std::vector<OfPatch> patches_;
+  std::vector<double> right_, moved_;
+  std::array<std::vector<double>, 2> answers_;
+  std::vector<double> rows_, others_, wrench_;
+};
+
+/// Sweeps and steps of Newton's method until nothing changes. `largest` is the largest slip without forces.
+ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws> laws, double duration, double largest,
+                                           std::span<double> velocity) const {
+  const int count = int(island.patches.size());
+  Ended ended;
+  std::optional<Newton> newton;
+  int unknowns = 0;
+  for (int body : island.bodies) unknowns += bodies_.bodies()[body].coordinates;
+  const bool small = unknowns > 0 && unknowns <= kUnknowns;
+  double changed = 0;
+  for (const int most = std::clamp(kVisits / count, kFewest, kMost); ended.sweeps < most;) {
+    // Sweeps go there and back, so that a push at one end of a stack soon reaches the other end.
+    changed = 0;
+    find_relative_damping(island, velocity, laws);
+    for (int k = 0; k < count; ++k) {
+      const int i = island.patches[ended.sweeps % 2 ? count - 1 - k : k];
+      changed = std::max(changed, visit(i, laws[i], duration, velocity));
+    }
+    ++ended.sweeps;
+    largest = std::max(largest, changed);  // bodies may be at rest until they are pushed
+    if (changed <= kSettled * largest) break;
+    if (!small || ended.sweeps < kPlain || ended.sweeps == most || (newton && newton->steps() * unknowns >= kWork))
+      continue;
+    if (!newton) newton.emplace(*this, island);
+    newton->settle(laws, duration, std::max(kSettled / 10 * largest, kSearched / 10 * changed), velocity);
+  }
+  ended.residual = changed > 0 ? changed / largest : 0;
+  return ended;
 }
 
 ContactSolver::Solution ContactSolver::solve(const Step& step) {
@@ -388,7 +710,6 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   const std::span<const MovedOn> ahead = step.ahead.empty() ? std::span<const MovedOn>(found) : step.ahead;
   std::vector<Laws> laws;
   laws.reserve(count);
-  double largest = 0;
   std::vector<Six> before;
   std::vector<Drift> drifts;
   for (const Row& row : rows_) before.push_back(slip_of(row, step.velocity));
@@ -396,37 +717,34 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   for (int i = 0; i < count; ++i) {
     const ElasticPatch& patch = patches_[i];
     const Row& row = rows_[i];
-    const Six free = slip_of(row, velocity);
-    largest = std::max({largest, std::abs(free.normal[0]), std::abs(free.tangential[0]), std::abs(free.tangential[1])});
     const Rule rule = step.damped[i] ? Rule::kDamping : Rule::kKeeping;
     const Pressure::Damping damped = damping(i, before, drifts);
     laws.push_back({{patch, row.area, row.normal_by_normal, damped, before[i].normal, h, rule},
                     {patch, row.area, h * row.tangential_by_tangential, step.friction},
                     known_wrench(i),
                     drifts[i]});
+    if (patch.rolling > 0) {
+      const ThreeByThree turns{{{0, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+      laws[i].rolling.emplace(turns, h * row.normal_by_normal, patch.rolling);
+    }
     laws[i].wrench.tangential = laws[i].friction.begin(laws[i].wrench.tangential);
   }
+  std::vector<double> free;
+  for (const Row& row : rows_) {
+    const Six slip = slip_of(row, velocity);
+    free.push_back(std::max({std::abs(slip.normal[0]), std::abs(slip.tangential[0]), std::abs(slip.tangential[1])}));
+  }
   for (int i = 0; i < count; ++i) push(rows_[i], laws[i].wrench, h, velocity);
-  int sweeps = 0;
-  double changed = 0;
-  Momentum momentum;
-  for (const int most = std::clamp(kVisits / std::max(1, count), kFewest, kMost); sweeps < most && count > 0;) {
-    // Sweeps go there and back, so that a push at one end of a stack soon reaches the other end.
-    changed = 0;
-    find_relative_damping(velocity, laws);
-    for (int k = 0; k < count; ++k) {
-      const int i = sweeps % 2 ? count - 1 - k : k;
-      changed = std::max(changed, visit(i, laws[i], h, velocity));
-    }
-    ++sweeps;
-    largest = std::max(largest, changed);  // bodies may be at rest until they are pushed
-    if (changed <= kSettled * largest) break;
-    const bool there_and_back = sweeps >= kPlain && sweeps % 2 == 0 && sweeps + 2 <= most;
-    if (there_and_back && step.friction == Friction::kEllipsoid) extrapolate(momentum, laws, h, velocity);
+  Ended all;
+  for (const Island& island : islands()) {
+    double largest = 0;
+    for (int i : island.patches) largest = std::max(largest, free[i]);
+    const Ended ended = settle(island, laws, h, largest, velocity);
+    all = {std::max(all.sweeps, ended.sweeps), std::max(all.residual, ended.residual)};
   }
   Solution solution = solved(laws, velocity);
-  solution.sweeps = sweeps;
-  solution.residual = changed > 0 ? changed / largest : 0;
+  solution.sweeps = all.sweeps;
+  solution.residual = all.residual;
   remember(solution, laws, h);
   return solution;
 }

@@ -20,8 +20,8 @@ struct PatchForce {
 };
 
 /// The forces of patches on bodies within one step, implicit in the velocities at its end. Pressures follow a rule that
-/// keeps energy. Friction follows Coulomb's law. Patches are solved one by one until nothing changes (projected
-/// Gauss–Seidel).
+/// keeps energy. Friction follows Coulomb's law. Patches are solved one by one (projected Gauss–Seidel), and all
+/// patches of bodies that touch each other at once (Newton's method) until nothing changes.
 class ContactSolver {
  public:
   explicit ContactSolver(Multibodies bodies) : bodies_(std::move(bodies)) {}
@@ -48,7 +48,7 @@ class ContactSolver {
     std::vector<std::array<Vec3, 2>> links;  ///< force and torque on each link, about its centre of mass
     std::vector<double> acceleration;        ///< of all coordinates, by the patches
     int sweeps = 0;
-    double residual = 0;  ///< the largest change of a slip in the last sweep, over the largest slip
+    double residual = 0;  ///< the largest change of a slip in the last sweep, over the largest slip without forces
   };
 
   /// Solves a step with the patches as they were placed.
@@ -114,28 +114,37 @@ class ContactSolver {
   /// The laws of a patch in a step, and its present wrench.
   struct Laws;
 
-  /// The wrenches two sweeps before, the extrapolated wrenches with which the last two sweeps began, and the weight of
-  /// the extrapolation.
-  struct Momentum {
-    std::vector<Six> before, begun;
-    double weight = 1;
+  /// Patches whose bodies touch each other, directly or through others. Bodies that forces do not move do not count.
+  struct Island {
+    std::vector<int> patches;
+    std::vector<int> bodies;
   };
+
+  /// How an island was solved, see Solution.
+  struct Ended {
+    int sweeps = 0;
+    double residual = 0;
+  };
+
+  class Newton;
 
   void add_sides(Row& row, const ElasticPatch& patch);
   void share_damping();
-  void find_relative_damping(std::span<const double> velocity, std::span<Laws> laws) const;
+  void find_relative_damping(const Island& island, std::span<const double> velocity, std::span<Laws> laws) const;
+  std::vector<Island> islands() const;
+  Ended settle(const Island& island, std::span<Laws> laws, double duration, double largest,
+               std::span<double> velocity) const;
   void add_single(Row& row, int link, double sign, Vec3 centroid);
   void add_side(Row& row, int body, std::span<const double> jacobian);
   Screw answer(const Side& side, const Screw& wrench) const;
   Six slip_of(const Row& row, std::span<const double> velocity) const;
   void push(const Row& row, const Six& wrench, double factor, std::span<double> velocity) const;
+  static Six response(const Row& row, const Six& wrench);
   Six known_wrench(size_t patch) const;
   double staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const;
   Drift drift(size_t patch, const Step& step, std::span<const MovedOn> ahead) const;
   Pressure::Damping damping(size_t patch, std::span<const Six> before, std::span<const Drift> drifts) const;
-  void roll(size_t patch, Laws& laws, double duration, const Three& slip) const;
   double visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const;
-  void extrapolate(Momentum& momentum, std::span<Laws> laws, double duration, std::span<double> velocity) const;
   Solution solved(std::span<const Laws> laws, std::span<const double> velocity) const;
   void remember(const Solution& solution, std::span<const Laws> laws, double duration);
 

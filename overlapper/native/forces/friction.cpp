@@ -6,10 +6,13 @@
 namespace overlapper {
 namespace {
 
+/// Trace of a mobility times which its eigenvalues are regarded as zero.
+constexpr double kLeast = 1e-15;
+
 /// The Cholesky factor of a symmetric matrix with `shift` added along its diagonal.
 struct Factor {
   Factor(const ThreeByThree& m, double shift) {
-    const double least = 1e-15 * (m[0][0] + m[1][1] + m[2][2] + shift);
+    const double least = kLeast * (m[0][0] + m[1][1] + m[2][2] + shift);
     const auto root = [&](double square) { return 1 / std::sqrt(std::max(square, least)); };
     a = root(m[0][0] + shift);
     b = m[1][0] * a;
@@ -66,18 +69,58 @@ Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, do
   return (size > limit ? -limit / size : -1) * force;
 }
 
+Coulomb::Coulomb(const ThreeByThree& rows, const ThreeByThree& mobility, double share)
+    : rows_(rows), back_(transposed(rows)), mobility_(rows * (mobility * back_)), share_(share) {
+  for (int i = 0; i < 3; ++i)
+    if (dot(rows[i], rows[i]) == 0) mobility_[i][i] = 1;
+}
+
+void Coulomb::answer(const Three& slip, double pressing) {
+  force_ = opposing(mobility_, rows_ * slip - mobility_ * force_, share_ * pressing, shift_);
+}
+
+Linear Coulomb::held(const Three& slip, double pressing, double give) {
+  const ThreeByThree mobility = give * mobility_;
+  const double limit = share_ * pressing;
+  const Three free = rows_ * slip - mobility * force_;
+  held_ = opposing(mobility, free, limit, held_shift_);
+  // With H = mobility + shift, H force = -free and |force| = limit. Without a limit, the shift stays 0.
+  ThreeByThree by_free{};
+  Three by_limit{};
+  const double scale = mobility[0][0] + mobility[1][1] + mobility[2][2], speed = std::sqrt(dot(free, free));
+  if (limit > 0 && scale > 0) {
+    ThreeByThree shifted = mobility;
+    for (int i = 0; i < 3; ++i) shifted[i][i] += held_shift_ + kLeast * scale;
+    by_free = -1 * inverse(shifted);
+    if (held_shift_ > 0) {
+      const Three along = -1 * (by_free * held_);
+      const double steep = dot(held_, along);
+      by_limit = (limit / steep) * along;
+      by_free = by_free + (1 / steep) * outer(along, along);
+    }
+  } else if (speed > 0) {
+    by_limit = (-1 / speed) * free;
+  }
+  return {back_ * held_, back_ * (by_free * rows_), share_ * (back_ * by_limit)};
+}
+
 PatchFriction::PatchFriction(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility,
                              Friction kind)
-    : coefficient_(patch.friction), distance_(area.distance > 0 ? area.distance : 0), mobility_(mobility) {
-  if (area.area > 0 && coefficient_ > 0) distance_ += patch.spinning / coefficient_;
+    : distance_(area.distance > 0 ? area.distance : 0), mobility_(mobility) {
+  if (area.area > 0 && patch.friction > 0) distance_ += patch.spinning / patch.friction;
   if (kind == Friction::kDistributed && area.area > 0) {
-    spread(area);
+    spread(area, patch.friction);
   } else {
-    for (int i = 0; i < 3; ++i) mobility_[2][i] *= distance_, mobility_[i][2] *= distance_;
+    const ThreeByThree rows{{{1, 0, 0}, {0, 1, 0}, {0, 0, distance_}}};
+    parts_.emplace_back(rows, mobility, patch.friction);
   }
 }
 
-void PatchFriction::spread(const PlaneArea& area) {
+void PatchFriction::spread(const PlaneArea& area, double coefficient) {
+  struct Point {
+    double u, v, share;
+  };
+  std::vector<Point> points;
   const double half = (area.uu - area.vv) / 2, mean = (area.uu + area.vv) / 2, split = std::hypot(half, area.uv);
   const double turn = std::atan2(area.uv, half) / 2, c = std::cos(turn), s = std::sin(turn);
   const double a = std::sqrt(3 * (mean + split)), b = std::sqrt(3 * std::max(mean - split, 0.0));
@@ -85,8 +128,8 @@ void PatchFriction::spread(const PlaneArea& area) {
   for (size_t i = 0; i < kGaussNodes.size(); ++i)
     for (size_t j = 0; j < kGaussNodes.size(); ++j) {
       const double x = a * kGaussNodes[i], y = b * kGaussNodes[j], share = kWeights[i] * kWeights[j];
-      points_.push_back({c * x - s * y, s * x + c * y, share});
-      reach += share * std::hypot(area.u + points_.back().u, area.v + points_.back().v);
+      points.push_back({c * x - s * y, s * x + c * y, share});
+      reach += share * std::hypot(area.u + points.back().u, area.v + points.back().v);
     }
   // The mean distance of the points is scaled to that of the area. The resistance to a spin is then right.
   const double stretch = distance_ > 0 && reach > 0 ? distance_ / reach : 1;
@@ -95,48 +138,51 @@ void PatchFriction::spread(const PlaneArea& area) {
   const double slope_u = square > 0 ? (area.uv * area.v - vv * area.u) / square : 0;
   const double slope_v = square > 0 ? (area.uv * area.u - uu * area.v) / square : 0;
   double total = 0;
-  for (Point& point : points_) {
+  for (Point& point : points) {
     point.share *= std::max(0.0, 1 + slope_u * point.u + slope_v * point.v);
     point.u = area.u + stretch * point.u, point.v = area.v + stretch * point.v;
     total += point.share;
   }
-  for (Point& point : points_) point.share /= total;
+  for (const Point& point : points) {
+    shares_.push_back(point.share / total);
+    const ThreeByThree rows{{{1, 0, -point.v}, {0, 1, point.u}, {0, 0, 0}}};
+    parts_.emplace_back(rows, mobility_, coefficient * shares_.back());
+  }
 }
 
 Three PatchFriction::begin(const Three& known) {
-  if (points_.empty()) return distance_ > 0 ? known : Three{known[0], known[1], 0};
+  if (shares_.empty()) parts_[0].begin({known[0], known[1], distance_ > 0 ? known[2] / distance_ : 0});
+  for (size_t i = 0; i < shares_.size(); ++i) parts_[i].begin({shares_[i] * known[0], shares_[i] * known[1], 0});
+  return wrench();
+}
+
+Three PatchFriction::wrench() const {
   Three sum{};
-  for (Point& point : points_) {
-    point.fu = point.share * known[0], point.fv = point.share * known[1];
-    sum = sum + Three{point.fu, point.fv, point.u * point.fv - point.v * point.fu};
+  for (const Coulomb& part : parts_) sum = sum + part.wrench();
+  return sum;
+}
+
+Three PatchFriction::answer(Three slip, double force) {
+  for (Coulomb& part : parts_) {
+    const Three before = part.wrench();
+    part.answer(slip, force);
+    slip = slip + mobility_ * (part.wrench() - before);
+  }
+  return wrench();
+}
+
+Linear PatchFriction::held(const Three& slip, double force, double give) {
+  Linear sum;
+  for (Coulomb& part : parts_) {
+    const Linear one = part.held(slip, force, give);
+    sum.value = sum.value + one.value, sum.by_slip = sum.by_slip + one.by_slip;
+    sum.by_other = sum.by_other + one.by_other;
   }
   return sum;
 }
 
-Three PatchFriction::answer(const Three& slip, const Three& last, double force) {
-  const double limit = coefficient_ * force;
-  if (!points_.empty()) return at_points(slip, limit);
-  const Three had{last[0], last[1], distance_ > 0 ? last[2] / distance_ : 0};
-  const Three free = Three{slip[0], slip[1], distance_ * slip[2]} - mobility_ * had;
-  const Three found = opposing(mobility_, free, limit, shift_);
-  return {found[0], found[1], distance_ * found[2]};
-}
-
-Three PatchFriction::at_points(Three slip, double limit) {
-  Three sum{};
-  for (Point& point : points_) {
-    // The slip at the point, from the slip of the patch; and the change of the point's slip by forces at the point.
-    const auto there = [&](const Three& of) { return Three{of[0] - point.v * of[2], of[1] + point.u * of[2], 0}; };
-    const Three by_u = mobility_ * Three{1, 0, -point.v}, by_v = mobility_ * Three{0, 1, point.u};
-    const Three uu = there(by_u), vv = there(by_v);
-    const ThreeByThree mobility{{{uu[0], vv[0], 0}, {uu[1], vv[1], 0}, {0, 0, 1}}};
-    const Three free = there(slip) - point.fu * uu - point.fv * vv;
-    const Three found = opposing(mobility, free, limit * point.share, point.shift);
-    slip = slip + (found[0] - point.fu) * by_u + (found[1] - point.fv) * by_v;
-    point.fu = found[0], point.fv = found[1];
-    sum = sum + Three{point.fu, point.fv, point.u * point.fv - point.v * point.fu};
-  }
-  return sum;
+void PatchFriction::take() {
+  for (Coulomb& part : parts_) part.take();
 }
 
 }  // namespace overlapper

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "forces/elastic_patch.h"
+#include "forces/linear.h"
 #include "forces/three.h"
 
 namespace overlapper {
@@ -19,6 +19,35 @@ enum class Friction { kEllipsoid, kDistributed };
 /// answer replaces it.
 Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, double& shift);
 
+/// Coulomb's law for a part of the slip of a patch.
+class Coulomb {
+ public:
+  /// `rows` times the slip is the part of the slip; a row of zeros is not used. `mobility` times forces of the patch is
+  /// the change of the slip within the step. The force is at most `share` times the pressing force.
+  Coulomb(const ThreeByThree& rows, const ThreeByThree& mobility, double share);
+
+  /// The force as one of the patch.
+  Three wrench() const { return back_ * force_; }
+
+  void begin(const Three& force) { force_ = force; }
+
+  /// Answers a slip that includes the effect of the force before. Pressures push with `pressing`.
+  void answer(const Three& slip, double pressing);
+
+  /// The wrench near this slip, if the force before holds the slip back as far as it may: a slip that it does not end
+  /// changes the force so much that `give` times the change would end it. The other number is the pressing force.
+  Linear held(const Three& slip, double pressing, double give);
+
+  /// Takes the force of the last call of `held`.
+  void take() { force_ = held_; }
+
+ private:
+  ThreeByThree rows_, back_, mobility_;
+  double share_;
+  Three force_{}, held_{};
+  double shift_ = 0, held_shift_ = 0;
+};
+
 /// The friction of a patch in a step: forces along two axes in the plane, and a torque about the normal through the
 /// centroid of the volume.
 class PatchFriction {
@@ -29,22 +58,22 @@ class PatchFriction {
   /// Begins with known forces, limited to those that this law allows, and returns them.
   Three begin(const Three& known);
 
-  /// The forces at the end of the step. `slip` includes the effect of `last`, the last answer; pressures push with
-  /// `force`.
-  Three answer(const Three& slip, const Three& last, double force);
+  Three wrench() const;
+
+  /// Answers a slip that includes the effect of the present forces; pressures push with `force`. Returns the wrench.
+  Three answer(Three slip, double force);
+
+  /// See Coulomb.
+  Linear held(const Three& slip, double force, double give);
+  void take();
 
  private:
-  struct Point {
-    double u, v, share;
-    double fu = 0, fv = 0, shift = 0;
-  };
+  void spread(const PlaneArea& area, double coefficient);
 
-  void spread(const PlaneArea& area);
-  Three at_points(Three slip, double limit);
-
-  double coefficient_, distance_, shift_ = 0;
+  double distance_;
   ThreeByThree mobility_;
-  std::vector<Point> points_;
+  std::vector<Coulomb> parts_;  ///< the whole patch, or points
+  std::vector<double> shares_;  ///< of the points in the pressing force
 };
 
 }  // namespace overlapper

@@ -58,21 +58,69 @@ Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const Three
   in_radii_ = {vv / square, -uv / square, uu / square};
 }
 
+/// Whether the pressures that are asked for are on the patch, and the pressures by a force of 1 if not.
+struct Pressure::Drawn {
+  bool on_patch;
+  Three per_force;
+  double x, y, far, back;
+};
+
+Pressure::Drawn Pressure::drawn(const Three& asked) const {
+  if (!(area_.area > 0)) return {false, {1, 0, 0}, 0, 0, 0, 0};
+  // Torques without a force have their centre infinitely far away. A negative force may come from torques that the
+  // patch cannot give. The force may be positive without these torques.
+  const double share = std::max(0.0, asked[0]);
+  const double x = -asked[2] - share * area_.u, y = asked[1] - share * area_.v;
+  const double far = in_radii_[0] * x * x + 2 * in_radii_[1] * x * y + in_radii_[2] * y * y;
+  const bool on_patch = asked[0] > 0 && !(far > kReach2 * asked[0] * asked[0]);
+  const double back = far > 0 ? std::sqrt(kReach2 / far) : 0;
+  return {on_patch, {1, area_.v + back * y, -(area_.u + back * x)}, x, y, far, back};
+}
+
 Three Pressure::answer(const Three& slip, double more) const {
   const Three target = rest_ - response_ * slip - Three{more, 0, 0};
   const Three asked = implicit_ * target;
-  const double force = asked[0];
-  if (!(area_.area > 0)) return {std::max(0.0, force), 0, 0};
-  // Torques without a force have their centre infinitely far away. A negative force may come from torques that the
-  // patch cannot give. The force may be positive without these torques.
-  const double share = std::max(0.0, force);
-  const double x = -asked[2] - share * area_.u, y = asked[1] - share * area_.v;
-  const double far = in_radii_[0] * x * x + 2 * in_radii_[1] * x * y + in_radii_[2] * y * y;
-  if (force > 0 && !(far > kReach2 * force * force)) return asked;
-  const double back = far > 0 ? std::sqrt(kReach2 / far) : 0;
-  const Three per_force{1, area_.v + back * y, -(area_.u + back * x)};
-  const double moved = overlapper::dot(response_[0], mobility_ * per_force);
-  return std::max(0.0, target[0] / (1 + duration_ * moved)) * per_force;
+  const Drawn to = drawn(asked);
+  if (to.on_patch) return asked;
+  const double moved = overlapper::dot(response_[0], mobility_ * to.per_force);
+  return std::max(0.0, target[0] / (1 + duration_ * moved)) * to.per_force;
+}
+
+Linear Pressure::held(const Three& slip, double more, double give, const Three& before, const Three& present) const {
+  const ThreeByThree pushed_back = duration_ * (response_ * mobility_);
+  const Three target = rest_ - response_ * slip - Three{more, 0, 0};
+  const Three asked = implicit_ * (target + pushed_back * present);
+  const Drawn to = drawn(asked);
+  const Three with_give = target + give * (pushed_back * before);
+  if (to.on_patch) {
+    const ThreeByThree whole = inverse(kIdentity + give * pushed_back);
+    if (const Three held = whole * with_give; held[0] > 0)
+      return {held, -1 * (whole * response_), -1 * transposed(whole)[0]};
+  }
+  const double stiff = 1 + give * overlapper::dot(pushed_back[0], to.per_force), force = with_give[0] / stiff;
+  if (!(force > 0)) return {};
+  Linear found{force * to.per_force, (-1 / stiff) * outer(to.per_force, response_[0]), (-1 / stiff) * to.per_force};
+  if (!(to.far > 0)) return found;
+  // The point to which the centre is drawn back turns about the centre of the area.
+  const auto turned = [&](const Three& by) {
+    const double grown = asked[0] > 0 ? by[0] : 0, dx = -by[2] - grown * area_.u, dy = by[1] - grown * area_.v;
+    const double farther =
+        (in_radii_[0] * to.x + in_radii_[1] * to.y) * dx + (in_radii_[1] * to.x + in_radii_[2] * to.y) * dy;
+    const double nearer = -to.back * farther / to.far;
+    const Three per_force{0, to.back * dy + nearer * to.y, -(to.back * dx + nearer * to.x)};
+    return force * (per_force - (give * overlapper::dot(pushed_back[0], per_force) / stiff) * to.per_force);
+  };
+  const ThreeByThree by_slip = transposed(implicit_ * response_), by_present = transposed(implicit_ * pushed_back);
+  ThreeByThree turned_by_slip{}, kept{};
+  for (int k = 0; k < 3; ++k)
+    turned_by_slip[k] = -1 * turned(by_slip[k]), kept[k] = kIdentity[k] - turned(by_present[k]);
+  found.by_slip = found.by_slip + transposed(turned_by_slip);
+  found.by_other = found.by_other - turned(transposed(implicit_)[0]);
+  // The pressures at the end of a step of Newton's method are then those present.
+  const ThreeByThree whole = inverse(transposed(kept));
+  found.value = present + whole * (found.value - present);
+  found.by_slip = whole * found.by_slip, found.by_other = whole * found.by_other;
+  return found;
 }
 
 }  // namespace overlapper

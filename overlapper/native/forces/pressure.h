@@ -1,6 +1,7 @@
 #pragma once
 
 #include "forces/elastic_patch.h"
+#include "forces/linear.h"
 #include "forces/three.h"
 
 namespace overlapper {
@@ -25,11 +26,17 @@ class Pressure {
            const Three& before, double duration, Rule rule);
 
   /// The pressures. `slip` is the slip at the end of the step without them. Pressures push, and their centre stays on
-  /// the area.
-  /// `more` in N is damping that does not follow from this slip.
+  /// the area. `more` in N is damping that does not follow from this slip.
   Three answer(const Three& slip, double more) const;
 
+  /// The pressures near a slip that includes the effect of those `present`. They are held back from those `before`, as
+  /// in Coulomb::held. The other number is `more`.
+  Linear held(const Three& slip, double more, double give, const Three& before, const Three& present) const;
+
  private:
+  struct Drawn;
+  Drawn drawn(const Three& asked) const;
+
   PlaneArea area_;
   ThreeByThree mobility_, response_, implicit_;
   Three rest_;

@@ -26,6 +26,19 @@ inline ThreeByThree operator*(const ThreeByThree& a, const ThreeByThree& b) {
 
 inline ThreeByThree operator*(double s, const ThreeByThree& m) { return {s * m[0], s * m[1], s * m[2]}; }
 
+inline ThreeByThree operator+(const ThreeByThree& a, const ThreeByThree& b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+
+inline ThreeByThree transposed(const ThreeByThree& m) {
+  return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
+}
+
+/// The matrix with these rows: each component of `a` times `b`.
+inline ThreeByThree outer(const Three& a, const Three& b) { return {a[0] * b, a[1] * b, a[2] * b}; }
+
+constexpr ThreeByThree kIdentity{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+
 /// The inverse of a regular matrix.
 ThreeByThree inverse(const ThreeByThree& m);
 

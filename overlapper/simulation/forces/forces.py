@@ -50,8 +50,9 @@ class Forces(Tabular):
     frame : callable
         Returns position and quaternion xyzw of the frame of a link (body, link), at the time of the contacts.
     residual : float, default 0
-        How much the solver still changed a slip when it ended, as a fraction of the largest slip. It is at most 1e-8 if
-        the forces are settled. In a mean, it is the largest of all substeps.
+        How much a slip would still change if each pair was solved again by itself, as a fraction of the largest slip
+        without forces. Each group of bodies that touch each other has its own largest slip. The residual is that of the
+        worst group. It is at most 1e-8 if the forces are settled. In a mean, it is the largest of all substeps.
     """
 
     contacts: Contacts

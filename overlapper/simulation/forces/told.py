@@ -25,7 +25,7 @@ from overlapper.simulation.model import Array, LinkKey
 LASTING = 0.1
 
 # A larger residual of the solver is worth a warning.
-SETTLED = 1e-3
+SETTLED = 1e-8
 
 
 class Told:

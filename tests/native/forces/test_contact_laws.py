@@ -294,7 +294,7 @@ def test_a_step_like_the_last_begins_with_the_solution_of_the_last(seed):
     assert empty.solve().sweeps == 0 and not empty.solve().acceleration.any()
 
 
-SWEEPS = [4, 5, 5, 3, 6, 4, 5, 5, 4, 5, 4, 5]
+SWEEPS = [4, 5, 5, 3, 5, 4, 5, 5, 4, 5, 4, 5]
 
 
 def test_scenes_at_random_are_solved_in_as_many_sweeps_as_before():
@@ -320,7 +320,7 @@ def stack(count, **given):
 def test_a_stack_settles_from_rest(count):
     """Its slips are measured by what the forces do to them, as none of them is known without forces."""
     found = stack(count).solve()
-    assert found.sweeps < 200 and 0 < found.residual <= 1e-8
+    assert found.sweeps < 300 and 0 < found.residual <= 1e-8
 
 
 @pytest.mark.parametrize(("count", "sweeps"), [(300, 33), (1200, 10)])
@@ -343,17 +343,76 @@ def foot(seed):
     return Scene(links, shapes, [0, 1, 1], [(1, 0), (2, 0)], **given)
 
 
+@pytest.mark.parametrize("distributed", [False, True])
 @pytest.mark.parametrize("seed", range(8))
-def test_patches_of_a_body_that_cannot_all_stick_are_solved_by_extrapolation(seed):
-    """Without extrapolation, five of these scenes use all 2,000 sweeps."""
-    solution = foot(seed).solve()
-    assert solution.sweeps < 1200 and broken_laws(solution, 1e-6) == []
+def test_patches_of_a_body_that_cannot_all_stick_are_solved_together(seed, distributed):
+    """One after the other, they need more than 2,000 sweeps."""
+    solution = replace(foot(seed), distributed=distributed).solve()
+    assert solution.sweeps <= 10 and solution.residual <= 1e-8
+    assert broken_laws(solution, 1e-6 if distributed else 1e-8) == []
 
 
-def test_sweeps_end_after_two_thousand():
-    """Friction at points is not extrapolated."""
-    solution = replace(foot(0), distributed=True).solve()
-    assert solution.sweeps == 2000 and solution.residual > 1e-8
+def wall(seed, rows=4, columns=4):
+    """A wall of bricks in bond of very different masses, that move at random on a floor."""
+    rng = np.random.default_rng(seed)
+    half, gap = np.array([0.1, 0.05, 0.03]), 1e-3
+    made, places, shapes, pairs, at = [Link(mass=0)], [(0.0, 0.0, 0.0)], [Placed(FLOOR)], [], {}
+    for row, column in itertools.product(range(rows), range(columns)):
+        place = (0.199 * column + 0.1 * (row % 2), 0.0, (2 * half[2] - gap) * row + half[2] - gap)
+        at[row, column] = len(shapes)
+        mass = 10.0 ** rng.uniform(-1, 1)
+        made.append(Link(mass=mass, inertia=mass * np.array([3.4e-3, 10.9e-3, 12.5e-3]) / 3))
+        places.append(place)
+        shapes.append(Placed(Box(half), place))
+    for (row, column), brick in at.items():
+        below = [0] if row == 0 else [at[row - 1, c] for c in (column, column + 2 * (row % 2) - 1) if 0 <= c < columns]
+        beside = [at[row, column - 1]] if column else []
+        pairs += [(brick, other) for other in below + beside]
+    links = replace(at_rest(*made), positions=np.array(places))
+    count = len(made)
+    velocity = np.concatenate([np.zeros(6), rng.normal(size=6 * (count - 1)) * 0.1])
+    given = {"stiffness": 1e7, "velocity": velocity, "acceleration": np.tile([0, 0, -9.81, 0, 0, 0], count)}
+    return Scene(links, shapes, range(count), pairs, **given)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_wall_of_bricks_is_solved_as_a_whole(seed):
+    """Each brick touches up to six others, so that the elimination of one joins others."""
+    solution = wall(seed).solve()
+    assert solution.sweeps <= 20 and solution.residual <= 1e-8
+    # Where a slip is small, its direction and that of friction have fewer digits.
+    assert broken_laws(solution, 1e-4) == []
+
+
+def test_each_group_of_bodies_is_solved_by_itself():
+    """A slow group beside a fast one has the forces that it has alone, to the last bit."""
+    alone = foot(0)
+    links = alone.links
+    apart = replace(
+        links,
+        links=(*links.links, Link(mass=1, inertia=[1 / 600] * 3)),
+        positions=np.vstack([links.positions, (5, 0, HALF - 1e-3)]),
+        orientations=np.vstack([links.orientations, UPRIGHT]),
+    )
+    both = replace(
+        alone,
+        links=apart,
+        shapes=[*alone.shapes, Placed(Box([HALF] * 3), (5, 0, HALF - 1e-3))],
+        on=[*alone.on, 2],
+        pairs=[*alone.pairs, (3, 0)],
+        velocity=np.concatenate([alone.velocity, [100.0, 0, 0, 0, 0, 0]]),
+        acceleration=np.concatenate([alone.acceleration, [0, 0, -9.81, 0, 0, 0]]),
+    )
+    assert np.array_equal(both.solve().force[:2], alone.solve().force)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_step_that_is_solved_again_has_the_same_forces(seed):
+    """Patches of one body that stick share their forces, so that the laws have many solutions."""
+    drawn = foot(seed)
+    first, second = drawn.solve(), drawn.solve()
+    assert second.sweeps <= 2
+    assert second.force == pytest.approx(first.force, rel=0, abs=1e-8 * np.abs(first.force).max())
 
 
 @pytest.mark.parametrize("direction", [(1, 0, 0), (0, 1, 0), (0.6, 0.8, 0)])
