@@ -25,6 +25,9 @@ constexpr int kMost = 2000;
 /// A step of Newton's method follows each sweep from this one on.
 constexpr int kPlain = 4;
 
+/// Wrenches are extrapolated from this sweep on where Newton's method is not used.
+constexpr int kAlone = 8;
+
 /// Newton's method is for islands of at most so many coordinates. Elimination takes too much time for larger ones.
 constexpr int kUnknowns = 300;
 
@@ -670,9 +673,41 @@ class ContactSolver::Newton {
   std::vector<double> rows_, others_, wrench_;
 };
 
+/// Extrapolates the wrenches after a sweep there and back (Nesterov 1983). It begins anew when the sweeps go against
+/// the extrapolation (O'Donoghue and Candès 2015). The next visits replace the wrenches, so these need not obey the
+/// laws.
+void ContactSolver::extrapolate(Momentum& momentum, const Island& island, std::span<Laws> laws, double duration,
+                                std::span<double> velocity) const {
+  auto& [before, begun, weight] = momentum;
+  double against = before.empty() ? 1 : 0;
+  for (size_t j = 0; j < before.size(); ++j) {
+    const Row& row = rows_[island.patches[j]];
+    const Six &now = laws[island.patches[j]].wrench, &last = before[j], &from = begun[j];
+    for (int k = 0; k < 3; ++k) {
+      against += row.normal_by_normal[k][k] * (from.normal[k] - now.normal[k]) * (now.normal[k] - last.normal[k]);
+      against += row.tangential_by_tangential[k][k] * (from.tangential[k] - now.tangential[k]) *
+                 (now.tangential[k] - last.tangential[k]);
+    }
+  }
+  before.resize(island.patches.size()), begun.resize(island.patches.size());
+  if (against > 0) weight = 1;
+  const double next = (1 + std::sqrt(1 + 4 * weight * weight)) / 2, factor = (weight - 1) / next;
+  weight = next;
+  for (size_t j = 0; j < before.size(); ++j) {
+    Laws& law = laws[island.patches[j]];
+    const Six more{factor * (law.wrench.normal - before[j].normal),
+                   factor * (law.wrench.tangential - before[j].tangential)};
+    push(rows_[island.patches[j]], more, duration, velocity);
+    before[j] = law.wrench;
+    law.wrench = begun[j] = {law.wrench.normal + more.normal, law.wrench.tangential + more.tangential};
+    law.friction.begin(law.wrench.tangential);
+  }
+}
+
 /// Sweeps and steps of Newton's method until nothing changes. `largest` is the largest slip without forces.
-ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws> laws, double duration, double largest,
+ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws> laws, const Step& step, double largest,
                                            std::span<double> velocity) const {
+  const double duration = step.duration;
   const int count = int(island.patches.size());
   Ended ended;
   std::optional<Newton> newton;
@@ -680,6 +715,7 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
   for (int body : island.bodies) unknowns += bodies_.bodies()[body].coordinates;
   const bool small = unknowns > 0 && unknowns <= kUnknowns;
   double changed = 0;
+  Momentum momentum;
   for (const int most = std::clamp(kVisits / count, kFewest, kMost); ended.sweeps < most;) {
     // Sweeps go there and back, so that a push at one end of a stack soon reaches the other end.
     changed = 0;
@@ -691,6 +727,9 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
     ++ended.sweeps;
     largest = std::max(largest, changed);  // bodies may be at rest until they are pushed
     if (changed <= kSettled * largest) break;
+    if (!small && ended.sweeps >= kAlone && ended.sweeps % 2 == 0 && ended.sweeps + 2 <= most &&
+        step.friction == Friction::kEllipsoid)
+      extrapolate(momentum, island, laws, duration, velocity);
     if (!small || ended.sweeps < kPlain || ended.sweeps == most || (newton && newton->steps() * unknowns >= kWork))
       continue;
     if (!newton) newton.emplace(*this, island);
@@ -739,7 +778,7 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   for (const Island& island : islands()) {
     double largest = 0;
     for (int i : island.patches) largest = std::max(largest, free[i]);
-    const Ended ended = settle(island, laws, h, largest, velocity);
+    const Ended ended = settle(island, laws, step, largest, velocity);
     all = {std::max(all.sweeps, ended.sweeps), std::max(all.residual, ended.residual)};
   }
   Solution solution = solved(laws, velocity);

@@ -120,6 +120,13 @@ class ContactSolver {
     std::vector<int> bodies;
   };
 
+  /// The wrenches of an island two sweeps before, the extrapolated wrenches with which the last two sweeps began, and
+  /// the weight of the extrapolation.
+  struct Momentum {
+    std::vector<Six> before, begun;
+    double weight = 1;
+  };
+
   /// How an island was solved, see Solution.
   struct Ended {
     int sweeps = 0;
@@ -132,8 +139,10 @@ class ContactSolver {
   void share_damping();
   void find_relative_damping(const Island& island, std::span<const double> velocity, std::span<Laws> laws) const;
   std::vector<Island> islands() const;
-  Ended settle(const Island& island, std::span<Laws> laws, double duration, double largest,
+  Ended settle(const Island& island, std::span<Laws> laws, const Step& step, double largest,
                std::span<double> velocity) const;
+  void extrapolate(Momentum& momentum, const Island& island, std::span<Laws> laws, double duration,
+                   std::span<double> velocity) const;
   void add_single(Row& row, int link, double sign, Vec3 centroid);
   void add_side(Row& row, int body, std::span<const double> jacobian);
   Screw answer(const Side& side, const Screw& wrench) const;
