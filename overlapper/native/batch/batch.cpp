@@ -14,6 +14,7 @@
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
 #include "methods/round/closed_forms/closed_forms.h"
+#include "overlap/depth_gradient.h"
 #include "overlap/second_derivatives.h"
 #include "overlap/shape_gradient.h"
 #include "shapes/planes_asked.h"
@@ -157,6 +158,18 @@ const std::vector<ShapeGradients>& Overlaps::shape_gradients() const {
     for (size_t row = 0; row < size(); ++row)
       if (status[row] == static_cast<std::int8_t>(Status::kOverlapping))
         std::ranges::copy(shape_gradient(*overlap(row)), found[row].begin());
+    return found;
+  });
+}
+
+const DepthGradients& Overlaps::depth_gradients() const {
+  return depth_gradients_->get([this] {
+    DepthGradients found{std::vector<BodyGradients>(size()), std::vector<ShapeGradients>(size())};
+    for (size_t row = 0; row < size(); ++row) {
+      if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) continue;
+      const DepthGradient one = depth_gradient(*overlap(row));
+      found.pose[row] = one.pose, found.shape[row] = one.shape;
+    }
     return found;
   });
 }

@@ -24,6 +24,12 @@ using BodyGradients = std::array<std::array<double, 6>, 2>;
 
 /// The derivatives of the volume by the numbers of the shapes of a and of b, as in shape_gradient().
 using ShapeGradients = std::array<Vec3, 2>;
+/// The derivatives of depths, a row per pair.
+struct DepthGradients {
+  std::vector<BodyGradients> pose;
+  std::vector<ShapeGradients> shape;
+};
+
 /// The second derivatives of the volume by the twelve numbers of BodyGradients.
 using PoseHessian = std::array<std::array<double, 12>, 12>;
 
@@ -72,6 +78,7 @@ struct Overlaps {
   /// Computed on first use, pair by pair.
   const Patches& patches() const;
   const std::vector<ShapeGradients>& shape_gradients() const;
+  const DepthGradients& depth_gradients() const;
   const std::vector<PoseHessian>& hessians() const;  ///< NaN for pairs with a round body
   /// The patch of a row. It is seen along a unit direction if one is given.
   Patch patch(size_t row, const std::optional<Vec3>& direction = {}) const;
@@ -83,6 +90,7 @@ struct Overlaps {
   using Shared = std::shared_ptr<Once<T>>;
   Shared<Patches> patches_ = std::make_shared<Once<Patches>>();
   Shared<std::vector<ShapeGradients>> shape_gradients_ = std::make_shared<Once<std::vector<ShapeGradients>>>();
+  Shared<DepthGradients> depth_gradients_ = std::make_shared<Once<DepthGradients>>();
   Shared<std::vector<PoseHessian>> hessians_ = std::make_shared<Once<std::vector<PoseHessian>>>();
 };
 

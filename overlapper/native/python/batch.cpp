@@ -271,6 +271,20 @@ void define_columns(nb::class_<Overlaps>& cls) {
       },
       R"((p, 2, 3) derivatives of the volume by the sizes of a and of b, m², as Overlap.shape_gradient; zeros unless
 overlapping. The first use takes some microseconds for each pair of polyhedra.)");
+  define_column<BodyGradients>(
+      cls, "depth_gradient",
+      [](const Overlaps& overlaps) -> const auto& {
+        return unlocked([&]() -> const DepthGradients& { return overlaps.depth_gradients(); }).pose;
+      },
+      R"((p, 2, 6) derivatives of the depth by the poses of a and of b, as Overlap.depth_gradient; zeros unless
+overlapping. The first use takes some microseconds for each pair.)");
+  define_column<ShapeGradients>(
+      cls, "depth_shape_gradient",
+      [](const Overlaps& overlaps) -> const auto& {
+        return unlocked([&]() -> const DepthGradients& { return overlaps.depth_gradients(); }).shape;
+      },
+      R"((p, 2, 3) derivatives of the depth by the sizes of a and of b, as Overlap.depth_shape_gradient; zeros unless
+overlapping.)");
   define_column<PoseHessian>(
       cls, "hessian",
       [](const Overlaps& overlaps) -> const auto& {

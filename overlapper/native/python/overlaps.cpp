@@ -4,6 +4,7 @@
 #include "distance/gjk.h"
 #include "distance/penetration.h"
 #include "methods/half_spaces_alone.h"
+#include "overlap/depth_gradient.h"
 #include "overlap/overlap.h"
 #include "overlap/second_derivatives.h"
 #include "overlap/shape_gradient.h"
@@ -133,6 +134,32 @@ pair. Pairs that touch or are separated have a normal, too. None for three or mo
       cls, "depth", always, [](const Contact& c) { return c.depth; }, nb::sig("def depth(self) -> float | None"),
       "m, length of the shortest translation that separates the pair; 0 unless overlapping. None for three or more "
       "bodies.");
+  const auto of_depth = [&](const char* name, auto part, const nb::sig& sig, const char* doc) {
+    cls.def_prop_ro(
+        name,
+        [part](const Overlap& o) -> nb::object {
+          if (!o.pair()) return nb::none();
+          const DepthGradient found = computed_of(o.bodies(), [&] { return depth_gradient(o); });
+          const auto& rows = found.*part;
+          const size_t width = sizeof rows[0] / sizeof(double);
+          const auto* first = reinterpret_cast<const double*>(rows.data());
+          return nb::cast(to_numpy<Matrix>(std::vector<double>(first, first + 2 * width), {2, width}),
+                          nb::rv_policy::move);
+        },
+        sig, doc);
+  };
+  of_depth(
+      "depth_gradient", &DepthGradient::pose,
+      nb::sig("def depth_gradient(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+      R"((2, 6) d depth / d (translation, rotation vector about the body's own position) of a and of b: the unit vector out of
+each body, and its moment at the point where the bodies touch once a is moved by depth * normal. 1 and m; zeros unless
+overlapping, None for three or more bodies. Where the bodies touch with a face or along an edge, rotations have one-sided
+derivatives, and one of the points that touch counts. Where two normals have the same depth, the one of `normal` counts.)");
+  of_depth(
+      "depth_shape_gradient", &DepthGradient::shape,
+      nb::sig("def depth_shape_gradient(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+      R"((2, 3) d depth / d (size) of a and of b, by the numbers of `shape_gradient`: half extents, radius and length, half axes, or
+the offset of a half-space. Without unit; zeros unless overlapping, None for three or more bodies. NaN for hulls.)");
   contact_property(
       cls, "distance", always, [](const Contact& c) { return c.distance; },
       nb::sig("def distance(self) -> float | None"),

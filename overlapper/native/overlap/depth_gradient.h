@@ -1,0 +1,25 @@
+#pragma once
+
+#include <array>
+
+#include "overlap/overlap.h"
+
+namespace overlapper {
+
+/// The derivatives of the depth of a pair.
+struct DepthGradient {
+  std::array<std::array<double, 6>, 2> pose{};  ///< by translation, then rotation vector about the body's position
+  std::array<Vec3, 2> shape{};                  ///< by the numbers of shape_gradient(); NaN for hulls
+};
+
+/// Zeros unless the pair overlaps.
+///
+/// The depth is the least of the translations along all directions that separate the bodies. Along the normal n, from b
+/// to a, it is the farthest place of b along n less the farthest place of a along -n. Sizes change these two places;
+/// the normal stays, or turns with a body without effect.
+///
+/// Moved apart, the bodies touch in a point. Each rotation moves this point along n. Where a face, or an edge in a
+/// face, touches, the depth has one-sided derivatives, and one of the points that touch counts.
+DepthGradient depth_gradient(const Overlap& overlap);
+
+}  // namespace overlapper
