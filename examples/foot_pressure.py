@@ -25,7 +25,7 @@ figure, axes = pyplot.subplots()
 for foot in FEET:
     (row,) = np.flatnonzero(contact.pairs[:, 4] == foot)
     corners = contact.contacts[row].overlap.vertices
-    sole = corners[corners[:, 2] < 0]  # the ground is at height 0
+    sole = corners[corners[:, 2] < -1e-12]  # the ground is at height 0, but for rounding
     pressure = -contact.last.stiffness[row] * sole[:, 2]
     drawn = axes.tripcolor(*sole[:, :2].T, pressure, shading="gouraud", vmin=0)
     at, force = contact.centre[row], -contact.force[row, 2]

@@ -824,6 +824,22 @@ class Overlap:
         """
 
     @property
+    def depth_gradient(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (2, 6) d depth / d (translation, rotation vector about the body's own position) of a and of b: the unit vector out of
+        each body, and its moment at the point where the bodies touch once a is moved by depth * normal. 1 and m; zeros unless
+        overlapping, None for three or more bodies. Where the bodies touch with a face or along an edge, rotations have one-sided
+        derivatives, and one of the points that touch counts. Where two normals have the same depth, the one of `normal` counts.
+        """
+
+    @property
+    def depth_shape_gradient(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (2, 3) d depth / d (size) of a and of b, by the numbers of `shape_gradient`: half extents, radius and length, half axes, or
+        the offset of a half-space. Without unit; zeros unless overlapping, None for three or more bodies. NaN for hulls.
+        """
+
+    @property
     def distance(self) -> float | None:
         """
         m, between the nearest points; 0 unless separated. None for three or more bodies.
@@ -1057,6 +1073,20 @@ class Overlaps:
         """
         (p, 2, 3) derivatives of the volume by the sizes of a and of b, m², as Overlap.shape_gradient; zeros unless
         overlapping. The first use takes some microseconds for each pair of polyhedra.
+        """
+
+    @property
+    def depth_gradient(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 2, 6) derivatives of the depth by the poses of a and of b, as Overlap.depth_gradient; zeros unless
+        overlapping. The first use takes some microseconds for each pair.
+        """
+
+    @property
+    def depth_shape_gradient(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 2, 3) derivatives of the depth by the sizes of a and of b, as Overlap.depth_shape_gradient; zeros unless
+        overlapping.
         """
 
     @property

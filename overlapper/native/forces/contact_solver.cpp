@@ -39,6 +39,8 @@ constexpr int kSteps = 12;
 
 /// How much sticking forces give way at first, and in the end.
 constexpr double kGive = 1e-2, kLeastGive = 1e-9;
+/// Groups with more coordinates keep how they share sticking forces: to share them anew takes many steps.
+constexpr int kFewCoordinates = 60;
 
 /// A search along a step ends when the power is less than this part of the power at its beginning.
 constexpr double kSearched = 0.1;
@@ -394,13 +396,15 @@ std::vector<ContactSolver::Island> ContactSolver::islands() const {
 
 /// Newton's method for all patches of an island at once. The unknowns are the changes of the velocities of its bodies,
 /// as these are few. Sticking forces give way a little from those before, so that the wrenches are functions of the
-/// velocities, see Coulomb::held. A few calls of `settle` leave nothing of that.
+/// velocities, see Coulomb::held. A few calls of `settle` leave nothing of that. In small groups, the first call gives
+/// way from no forces: patches that could share forces in many ways share them evenly.
 class ContactSolver::Newton {
  public:
   Newton(const ContactSolver& solver, const Island& island)
       : solver_(solver),
         island_(island),
         system_(sizes(solver, island), pairs(solver, island)),
+        kept_(system_.unknowns() <= kFewCoordinates ? 0 : 1),
         patches_(island.patches.size()) {
     moved_.resize(solver.bodies_.coordinates());
   }
@@ -447,6 +451,7 @@ class ContactSolver::Newton {
     if (!agreed) std::ranges::copy(begun, velocity.begin());
     give_ = agreed ? std::max(kLeastGive, give_ / tightening_) : std::min(1.0, give_ * 10);
     if (!agreed) tightening_ = 2;
+    if (agreed) kept_ = 1;
   }
 
   int steps() const { return steps_; }
@@ -530,8 +535,8 @@ class ContactSolver::Newton {
     Near found;
     found.pressed = laws.pressure.held(slip.normal, more, give_, before, laws.pressures());
     const double pressing = found.pressed.value[0];
-    found.rubbed = laws.friction.held(slip.tangential + laws.drift.slip, pressing, give_);
-    if (laws.rolling) found.rolled = laws.rolling->held(slip.normal, pressing, give_);
+    found.rubbed = laws.friction.held(slip.tangential + laws.drift.slip, pressing, give_, kept_);
+    if (laws.rolling) found.rolled = laws.rolling->held(slip.normal, pressing, give_, kept_);
     return found;
   }
 
@@ -666,6 +671,7 @@ class ContactSolver::Newton {
   const Island& island_;
   BlockSystem system_;
   double give_ = kGive, tightening_ = 30;
+  double kept_;
   int steps_ = 0;
   std::vector<OfPatch> patches_;
   std::vector<double> right_, moved_;

@@ -294,7 +294,7 @@ def test_a_step_like_the_last_begins_with_the_solution_of_the_last(seed):
     assert empty.solve().sweeps == 0 and not empty.solve().acceleration.any()
 
 
-SWEEPS = [4, 5, 5, 3, 5, 4, 5, 5, 4, 5, 4, 5]
+SWEEPS = [4, 6, 6, 3, 6, 4, 7, 6, 4, 6, 4, 6]
 
 
 def test_scenes_at_random_are_solved_in_as_many_sweeps_as_before():
