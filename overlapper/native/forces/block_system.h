@@ -6,9 +6,9 @@
 
 namespace overlapper {
 
-/// A system of linear equations in blocks of unknowns, of which few occur together. It is solved by elimination of one
-/// block after the other. Rows are exchanged within a block only. Blocks with few neighbours come first, so that few
-/// more blocks fill.
+/// A system of linear equations in blocks of unknowns. Few blocks occur together in an equation. Elimination of one
+/// block after the other solves the system. Rows are exchanged within a block only. Blocks with few neighbours come
+/// first, so that few more blocks fill.
 class BlockSystem {
  public:
   /// `sizes` are those of the blocks, and `together` the pairs of different blocks that occur in one equation.

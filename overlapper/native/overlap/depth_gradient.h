@@ -15,11 +15,11 @@ struct DepthGradient {
 /// Zeros unless the pair overlaps.
 ///
 /// The depth is the least of the translations along all directions that separate the bodies. Along the normal n, from b
-/// to a, it is the farthest place of b along n less the farthest place of a along -n. Sizes change these two places;
-/// the normal stays, or turns with a body without effect.
+/// to a, it is the farthest place of b along n less the farthest place of a along -n. Sizes change these two places.
+/// The least depth does not change at first order if n turns, and a face's normal does not depend on sizes.
 ///
-/// Moved apart, the bodies touch in a point. Each rotation moves this point along n. Where a face, or an edge in a
-/// face, touches, the depth has one-sided derivatives, and one of the points that touch counts.
+/// Moved apart, the bodies touch in a point. Each rotation moves this point along n. Where a face touches, or an edge
+/// in a face, the depth has one-sided derivatives. One of the points that touch then counts.
 DepthGradient depth_gradient(const Overlap& overlap);
 
 }  // namespace overlapper
