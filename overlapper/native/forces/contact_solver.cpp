@@ -404,7 +404,7 @@ class ContactSolver::Newton {
       : solver_(solver),
         island_(island),
         system_(sizes(solver, island), pairs(solver, island)),
-        kept_(system_.unknowns() <= kFewCoordinates ? 0 : 1),
+        afresh_(system_.unknowns() <= kFewCoordinates),
         patches_(island.patches.size()) {
     moved_.resize(solver.bodies_.coordinates());
   }
@@ -451,7 +451,7 @@ class ContactSolver::Newton {
     if (!agreed) std::ranges::copy(begun, velocity.begin());
     give_ = agreed ? std::max(kLeastGive, give_ / tightening_) : std::min(1.0, give_ * 10);
     if (!agreed) tightening_ = 2;
-    if (agreed) kept_ = 1;
+    if (agreed) afresh_ = false;
   }
 
   int steps() const { return steps_; }
@@ -535,8 +535,8 @@ class ContactSolver::Newton {
     Near found;
     found.pressed = laws.pressure.held(slip.normal, more, give_, before, laws.pressures());
     const double pressing = found.pressed.value[0];
-    found.rubbed = laws.friction.held(slip.tangential + laws.drift.slip, pressing, give_, kept_);
-    if (laws.rolling) found.rolled = laws.rolling->held(slip.normal, pressing, give_, kept_);
+    found.rubbed = laws.friction.held(slip.tangential + laws.drift.slip, pressing, give_, afresh_);
+    if (laws.rolling) found.rolled = laws.rolling->held(slip.normal, pressing, give_, afresh_);
     return found;
   }
 
@@ -671,7 +671,7 @@ class ContactSolver::Newton {
   const Island& island_;
   BlockSystem system_;
   double give_ = kGive, tightening_ = 30;
-  double kept_;
+  bool afresh_;  ///< sticking forces are shared anew
   int steps_ = 0;
   std::vector<OfPatch> patches_;
   std::vector<double> right_, moved_;

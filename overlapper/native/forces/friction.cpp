@@ -79,10 +79,10 @@ void Coulomb::answer(const Three& slip, double pressing) {
   force_ = opposing(mobility_, rows_ * slip - mobility_ * force_, share_ * pressing, shift_);
 }
 
-Linear Coulomb::held(const Three& slip, double pressing, double give, double kept) {
+Linear Coulomb::held(const Three& slip, double pressing, double give, bool afresh) {
   const ThreeByThree mobility = give * mobility_;
   const double limit = share_ * pressing;
-  const Three free = rows_ * slip - kept * (mobility * force_);
+  const Three free = afresh ? rows_ * slip : rows_ * slip - mobility * force_;
   held_ = opposing(mobility, free, limit, held_shift_);
   // With H = mobility + shift, H force = -free and |force| = limit. Without a limit, the shift stays 0.
   ThreeByThree by_free{};
@@ -171,10 +171,10 @@ Three PatchFriction::answer(Three slip, double force) {
   return wrench();
 }
 
-Linear PatchFriction::held(const Three& slip, double force, double give, double kept) {
+Linear PatchFriction::held(const Three& slip, double force, double give, bool afresh) {
   Linear sum;
   for (Coulomb& part : parts_) {
-    const Linear one = part.held(slip, force, give, kept);
+    const Linear one = part.held(slip, force, give, afresh);
     sum.value = sum.value + one.value, sum.by_slip = sum.by_slip + one.by_slip;
     sum.by_other = sum.by_other + one.by_other;
   }

@@ -35,9 +35,9 @@ class Coulomb {
   void answer(const Three& slip, double pressing);
 
   /// The wrench near this slip, if the force before holds the slip back as far as it may: a slip that it does not end
-  /// changes the force so much that `give` times the change would end it. The other number is the pressing force. Only
-  /// the part `kept` of the force before counts.
-  Linear held(const Three& slip, double pressing, double give, double kept);
+  /// changes the force so much that `give` times the change would end it. The other number is the pressing force. With
+  /// `afresh`, there was no force before.
+  Linear held(const Three& slip, double pressing, double give, bool afresh);
 
   /// Takes the force of the last call of `held`.
   void take() { force_ = held_; }
@@ -65,7 +65,7 @@ class PatchFriction {
   Three answer(Three slip, double force);
 
   /// See Coulomb.
-  Linear held(const Three& slip, double force, double give, double kept);
+  Linear held(const Three& slip, double force, double give, bool afresh);
   void take();
 
  private:
