@@ -138,6 +138,13 @@ def depth(a: Boxes, b: Boxes, *, aligned: bool = False, threads: int | None = 1)
     >>> jax.value_and_grad(deep)(1.5)
     (Array(0.5, dtype=float32), Array(-1., dtype=float32, weak_type=True))
     """
+    found: jax.Array = _depth(a, b, aligned, threads)
+    return found
+
+
+# As one compiled call: in the formula alone, JAX would compile every operation by itself.
+@partial(jax.jit, static_argnums=(2, 3))
+def _depth(a: Boxes, b: Boxes, aligned: bool, threads: int | None) -> jax.Array:
     six = (*a, *b)
     box_gradients.check(six, aligned)
     shape = a.sizes.shape[:-1] if aligned else (*a.sizes.shape[:-1], b.sizes.shape[-2])
