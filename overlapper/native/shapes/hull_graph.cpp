@@ -89,7 +89,7 @@ int steepest(const std::vector<NeighbourFan>& fans, const std::vector<int>& fan_
 }
 
 /// After so many steps, a climb continues in a tree, if there is one.
-constexpr int kMostSteps = 2;
+constexpr int kStepsOfClimb = 2;
 /// Up to so many steps between neighbouring cells of a map, a tree does not pay.
 constexpr int kUsualSteps = 8;
 
@@ -100,7 +100,7 @@ int climb(int start, double slack, int elements, Value value, Neighbours neighbo
           double& height, int& steps) {
   int top = start;
   height = value(top);
-  for (int left = kMostSteps;; --left) {
+  for (int left = kStepsOfClimb;; --left) {
     if (left == 0) {
       top = leap(top, height);
       height = value(top);
