@@ -15,8 +15,9 @@ LEAST_OF_PYTHON := 86
 LEAST_OF_CORE := 90
 # Images of containers often set this. Then each of the tests' thousands of processes would compile its imports anew.
 unexport PYTHONDONTWRITEBYTECODE
-# Tests that start a Ray cluster of several nodes, which takes a sixth of the time of all tests.
-CLUSTER := tests/sweep/test_ray_nodes.py
+# Tests that need a third of the time of all tests: a Ray cluster of several nodes, the code in the documentation, pages in
+# Chromium, the benchmarks, and pybullet's thousand models.
+SLOW := tests/sweep/test_ray_nodes.py tests/test_pages.py tests/viewer tests/benchmarks tests/simulation/bullet/test_models.py
 # One more process than processors, because many tests wait for a clock or a browser.
 WORKERS = $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
 # Coverage of the core: its object files, its tests, and tests that fail in a build with counters.
@@ -24,7 +25,7 @@ COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_out_of_memory python/test_stub
 
-.PHONY: help run test test-cluster test-torch wheel record docs coverage coverage-python coverage-core mutants fuzz locks pictures lint format hooks ci clean
+.PHONY: help run test test-slow test-torch wheel record docs coverage coverage-python coverage-core mutants fuzz locks pictures lint format hooks ci clean
 
 help: ## this list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -32,12 +33,12 @@ help: ## this list
 run: $(VENV)/run ## build, run SCENE=franka_grasp, write out/franka_grasp.csv and .html
 	@$(VENV)/bin/overlapper run $(SCENE) --out out/$(SCENE).csv --html out/$(SCENE).html
 
-test: $(VENV)/dev ## build, pass all tests except those of a Ray cluster
-	@echo "These tests take 10 to 20 minutes on 2 processors. Tests of a Ray cluster are another target: make test-cluster"
-	@$(PYTEST) --numprocesses=$(WORKERS) --dist=worksteal $(CLUSTER:%=--ignore=%)
+test: $(VENV)/dev ## build, pass all tests except the slow ones
+	@echo "These tests take about 10 minutes on 2 processors. Slow tests are another target: make test-slow"
+	@$(PYTEST) --numprocesses=$(WORKERS) --dist=worksteal $(SLOW:%=--ignore=%)
 
-test-cluster: $(VENV)/dev ## build, pass the tests of a Ray cluster of several nodes on this machine
-	@$(PYTEST) $(CLUSTER)
+test-slow: $(VENV)/dev ## build, pass the tests of a Ray cluster, the docs, pages in a browser, benchmarks, many models
+	@$(PYTEST) --numprocesses=$(WORKERS) --dist=worksteal $(SLOW)
 
 test-torch: build/torch/dev ## test overlapper.torch, in an environment of its own with torch (gigabytes)
 	@build/torch/bin/python -m pytest tests/with_torch
@@ -61,8 +62,8 @@ docs: $(VENV)/dev ## write the site of the documentation to build/docs
 coverage: coverage-python coverage-core ## report what the tests reach of Python and of the core
 
 # Subprocesses of tests are not counted: a signal during counting may cause a deadlock.
-coverage-python: $(VENV)/dev ## pass all tests, report the branches of Python that they reach
-	@$(MAKE) --no-print-directory test PYTEST="$(PYTEST) --cov --cov-report=term-missing:skip-covered \
+coverage-python: $(VENV)/dev ## pass all tests, slow ones too, report the branches of Python that they reach
+	@$(MAKE) --no-print-directory test SLOW= PYTEST="$(PYTEST) --cov --cov-report=term-missing:skip-covered \
 	  --cov-fail-under=$(LEAST_OF_PYTHON)"
 
 # Deletes the counts of the last run, which would be added. A killed process may leave a broken file, which is ignored.

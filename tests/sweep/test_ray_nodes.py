@@ -1,6 +1,6 @@
 """The engine of a Ray cluster on real nodes: the same bits as on one machine, also if a node is killed.
 
-Ray takes long to start, so `make test-cluster` passes these tests, and `make test` leaves them out.
+Ray takes long to start, so `make test-slow` passes these tests, and `make test` leaves them out.
 """
 
 import json
