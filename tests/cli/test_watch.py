@@ -568,7 +568,7 @@ def test_examples_of_pybullet_are_watched_unchanged(example):
     command = [*COMMAND, "watch", *options, "--out", "own.csv", "--html", "own.html", "--json", str(PYBULLET / example)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         try:
-            _, complaints = process.communicate(timeout=15 if options else 60)
+            _, complaints = process.communicate(timeout=10 if options else 60)
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGINT)
             _, complaints = process.communicate(timeout=30)
