@@ -15,9 +15,11 @@ LEAST_OF_PYTHON := 86
 LEAST_OF_CORE := 90
 # Images of containers often set this. Then each of the tests' thousands of processes would compile its imports anew.
 unexport PYTHONDONTWRITEBYTECODE
-# Tests that need a third of the time of all tests: a Ray cluster of several nodes, the code in the documentation, pages in
-# Chromium, the benchmarks, and pybullet's thousand models.
-SLOW := tests/sweep/test_ray_nodes.py tests/test_pages.py tests/viewer tests/benchmarks tests/simulation/bullet/test_models.py
+# Tests that need a third of the time of all tests: a Ray cluster of several nodes, the code in the documentation, the
+# examples, pages in Chromium, the benchmarks, pybullet's thousand models, certificates, and other builds of the core.
+SLOW := tests/sweep/test_ray_nodes.py tests/test_pages.py tests/cli/test_examples.py tests/viewer tests/benchmarks \
+  tests/simulation/bullet/test_models.py tests/proof tests/native/test_portable.py tests/native/test_other_libm.py \
+  tests/native/python/test_failing_allocation.py
 # One more process than processors, because many tests wait for a clock or a browser.
 WORKERS = $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
 # Coverage of the core: its object files, its tests, and tests that fail in a build with counters.
@@ -37,7 +39,7 @@ test: $(VENV)/dev ## build, pass all tests except the slow ones
 	@echo "These tests take about 10 minutes on 2 processors. Slow tests are another target: make test-slow"
 	@$(PYTEST) --numprocesses=$(WORKERS) --dist=worksteal $(SLOW:%=--ignore=%)
 
-test-slow: $(VENV)/dev ## build, pass the tests of a Ray cluster, the docs, pages in a browser, benchmarks, many models
+test-slow: $(VENV)/dev ## build, pass the tests of docs, pages in a browser, certificates, benchmarks, a cluster, models
 	@$(PYTEST) --numprocesses=$(WORKERS) --dist=worksteal $(SLOW)
 
 test-torch: build/torch/dev ## test overlapper.torch, in an environment of its own with torch (gigabytes)
