@@ -81,9 +81,11 @@ def step_figures(name: str, model: mujoco.MjModel) -> dict[str, float]:
         watch("mj_step", mujoco.mj_step, model, data)
         watch("update", bodies.update)
         contacts = watch("overlaps", bodies.overlaps)
+        watch("again", bodies.update)
         us.append(watch.take())
     check(name, contacts.overlaps, bodies)
-    mj_step, update, overlaps = (np.array([each[part] for each in us]) for part in ("mj_step", "update", "overlaps"))
+    parts = ("mj_step", "update", "overlaps", "again")
+    mj_step, update, overlaps, again = (np.array([each[part] for each in us]) for part in parts)
     ratios = (update + overlaps) / mj_step
     return {
         "geoms": len(bodies.shapes),
@@ -91,6 +93,7 @@ def step_figures(name: str, model: mujoco.MjModel) -> dict[str, float]:
         "mj_step": float(np.median(mj_step)),
         "update": float(np.median(update)),
         "overlaps": float(np.median(overlaps)),
+        "again": float(np.median(again)),
         **dict(zip(("ratio", "ratio_low", "ratio_high"), quartiles(ratios.tolist()))),
     }
 

@@ -36,7 +36,7 @@ def write_page(path: Path, folder: Path) -> Path:
         [
             name,
             *(f"{figures[column]:.0f}" for column in ("geoms", "overlapping")),
-            *(duration(figures[column]) for column in ("mj_step", "update", "overlaps")),
+            *(duration(figures[column]) for column in ("mj_step", "update", "again", "overlaps")),
             f"{figures['ratio']:.2f} ({figures['ratio_low']:.2f} to {figures['ratio_high']:.2f})",
         ]
         for name, figures in steps.items()
@@ -58,7 +58,7 @@ def write_page(path: Path, folder: Path) -> Path:
         folder / "mujoco_benchmarks.md",
         results=named(path),
         notes=indented(notes),
-        times=table(["model", "geoms", "overlaps", "`mj_step`", "`update()`", "`overlaps()`", "ratio"], times),
+        times=table(["model", "geoms", "overlaps", "`mj_step`", "`update()`", "again", "`overlaps()`", "ratio"], times),
         depths=table([*heading, "depth differs by, m", "`contact.dist` differs by, m"], depths),
         capsules=a_pair("100 capsules"),
         boxes=a_pair("100 boxes"),
