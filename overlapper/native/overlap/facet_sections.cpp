@@ -15,9 +15,9 @@ namespace {
 using pieces::PlanarPart;
 using pieces::WidePolygon;
 
-class RoundBody {
+class OtherBody {
  public:
-  RoundBody(const Placed& body, const Placed& flat, Vec3 inside)
+  OtherBody(const Placed& body, const Placed& flat, Vec3 inside)
       : body_(body), box_(bounds(body)), ellipsoid_(stretched(body.shape)) {
     pieces_->clear();
     pieces::EnclosingPolytope common;
@@ -74,7 +74,7 @@ class RoundBody {
 
 std::vector<FacetSection> facet_sections(const Overlap& overlap, int body, Vec3 reference) {
   const Placed &flat = overlap.bodies()[body], &round = overlap.bodies()[1 - body];
-  const RoundBody within(round, flat, reference);
+  const OtherBody within(round, flat, reference);
   const WideMatrix rotation = wide_rotation(flat.orientation);
   const WideVector position = wide_difference(flat.position, reference);
   std::vector<FacetSection> found;
@@ -93,8 +93,9 @@ std::vector<FacetSection> facet_sections(const Overlap& overlap, int body, Vec3 
       for (size_t i = 1; i + 1 < ring.size(); ++i) {
         const std::array<int, 3> corners{ring[0], ring[i], ring[i + 1]};
         polygon.clear();
-        for (const int v : corners) place(wide(hull->origin) + wide(at(v)));
         const WideVector normal = unit(wide_normal(at(corners[0]), at(corners[1]), at(corners[2])));
+        const WideVector out = DoubleDouble{core_radius(flat.shape)} * normal;
+        for (const int v : corners) place(wide(hull->origin) + wide(at(v)) + out);
         add(corners, rotation * normal, hull->flatness);
       }
     }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "geometry/cancellation.h"
+#include "methods/round/round.h"
 #include "overlap/facet_sections.h"
 #include "overlap/shape_gradient.h"
 
@@ -64,6 +65,24 @@ class HullSurface {
     const double twice = dot(twice_area(section.corners), section.normal);
     const Vec3 first = section.first - section.area * vertices_[section.corners[0]];
     if (twice > 0) add_shares(section.corners, section.normal, twice, section.area, first);
+  }
+
+  /// Adds the surface of a ball at a vertex, or of a cylinder along an edge.
+  void add(const pieces::RoundSurface& surface) {
+    if (surface.ball) {
+      const auto away = [&](Vec3 vertex) { return norm2(vertex - surface.centre); };
+      gradient_[std::ranges::min_element(vertices_, {}, away) - vertices_.begin()] += surface.force;
+      return;
+    }
+    const auto away = [&](const Edge& e) { return norm2((vertices_[e.from] + vertices_[e.to]) / 2 - surface.centre); };
+    const Edge& edge = *std::ranges::min_element(hull_.edges, {}, away);
+    const Vec3 way = vertices_[edge.to] - vertices_[edge.from];
+    const double length = norm(way);
+    const Vec3 towards = (dot(way, surface.axis) > 0 ? 1 : -1) / length * surface.along;
+    gradient_[edge.from] += surface.force / 2 - towards, gradient_[edge.to] += surface.force / 2 + towards;
+    for (const int v : {edge.from, edge.to}) {
+      moved_[v] += norm(surface.force) / length, area_[v] += norm(surface.force);
+    }
   }
 
   double reach() const { return reach_; }
@@ -140,13 +159,32 @@ Vec3 force_of(const Overlap& overlap, int body) {
   return {row[0], row[1], row[2]};
 }
 
-VertexGradient in_round_body(const Overlap& overlap, int body, bool with_errors) {
+/// The surfaces of the balls and cylinders of a rounded hull, about a point. No value if slices give up.
+std::optional<std::vector<pieces::RoundSurface>> round_surfaces(const Overlap& overlap, int body, Vec3 inside) {
+  const Arrangement at = arranged(overlap.bodies());
+  const int place = at.order[0] == body ? 0 : 1;
+  std::vector<pieces::RoundSurface> found;
+  const auto measured = measure_by_slices({.a = at.relative[place],
+                                           .b = at.relative[1 - place],
+                                           .reference = at.reference,
+                                           .inside = wide_difference(inside, at.reference),
+                                           .rounds = &found});
+  return measured ? std::optional(std::move(found)) : std::nullopt;
+}
+
+/// A hull that overlaps a round body, or a rounded hull. No value if slices give up.
+std::optional<VertexGradient> in_pair(const Overlap& overlap, int body, bool with_errors) {
   const Vec3 reference = overlap.centroid();
   HullSurface surface(overlap.bodies()[body], reference, {});
   double owned = with_errors ? overlap.errors().gradient[body][0] : 0;
   for (const FacetSection& section : facet_sections(overlap, body, reference)) {
     surface.add(section);
     owned += section.error;
+  }
+  if (smooth(overlap.bodies()[body].shape)) {
+    const auto rounds = round_surfaces(overlap, body, reference);
+    if (!rounds) return std::nullopt;
+    for (const pieces::RoundSurface& round : *rounds) surface.add(round);
   }
   return surface.found(force_of(overlap, body), owned, 16 * DBL_EPSILON * surface.reach(), with_errors);
 }
@@ -157,19 +195,21 @@ std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_e
   const std::span<const Placed> bodies = overlap.bodies();
   std::vector<VertexGradient> found(bodies.size());
   const bool overlapping = overlap.status() == Status::kOverlapping, flat = polyhedral(bodies);
-  const bool known = flat || overlap.pair();
+  Errors none;
+  none.gradient.resize(bodies.size());
   for (size_t i = 0; i < bodies.size(); ++i) {
-    if (smooth(bodies[i].shape) || !polytope_of(bodies[i].shape)) continue;
+    if (!polytope_of(bodies[i].shape)) continue;
     const size_t count = polytope_of(bodies[i].shape)->vertices.size();
-    const double value = known || !overlapping ? 0 : kNoDerivative;
+    const double value = overlapping ? kNoDerivative : 0;
     found[i].by_vertex.assign(count, {value, value, value});
     if (with_errors) found[i].error.assign(count, overlapping ? value : overlap.errors().gradient[i][0]);
-    if (!known || !overlapping) continue;
-    if (!flat) {
-      found[i] = in_round_body(overlap, static_cast<int>(i), with_errors);
+    if (!overlapping) continue;
+    if (!flat && overlap.pair()) {
+      if (auto in = in_pair(overlap, static_cast<int>(i), with_errors)) found[i] = std::move(*in);
       continue;
     }
-    const Region& region = overlap.drawn();
+    if (smooth(bodies[i].shape)) continue;
+    const Region& region = flat ? overlap.drawn() : overlap.region();
     HullSurface surface(bodies[i], region.reference, region.frame.origin);
     Polygon polygon;
     for (int f = 0; f < region.polytope.facets(); ++f) {
@@ -178,8 +218,8 @@ std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_e
       for (int v : region.polytope.facet(f)) polygon.push_back(region.frame.axes * region.polytope.vertices[v]);
       surface.add(polygon, region.facets[f].normal);
     }
-    const double owned = with_errors ? overlap.errors().gradient[i][0] : 0;
-    const double misplaced = with_errors ? overlap.errors().vertices : 0;
+    const Errors errors = !with_errors ? none : flat ? overlap.errors() : measured_with_errors(region, bodies).errors;
+    const double owned = errors.gradient[i][0], misplaced = errors.vertices;
     found[i] = surface.found(force_of(overlap, static_cast<int>(i)), owned, misplaced, with_errors);
   }
   return found;

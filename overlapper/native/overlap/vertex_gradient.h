@@ -12,8 +12,13 @@ struct VertexGradient {
   std::vector<double> error;    ///< m²: bound of the length of the error of each; empty unless wanted
 };
 
-/// For each body, the derivatives by the vertices of its hull. No vertices for a body that is no hull. NaN for groups
-/// with a round body.
+/// For each body, the derivatives by the vertices of its hull, or of the core of a rounded hull. No vertices for
+/// another body. In groups with a round body, those of the polytope that encloses the common set; NaN there for rounded
+/// hulls. NaN also for the few rounded hulls that cannot be sliced.
+///
+/// The surface of a rounded hull has three kinds of parts. A ball moves with its vertex. The points of a cylinder along
+/// an edge move as the points of the edge do: the derivatives are ∫ n dA, shared between both ends by ∫ s n dA, for the
+/// distance s along the edge. Facets move out by the radius keep their coordinates in the core.
 ///
 /// If a vertex moves, points of its facets move along with their barycentric coordinates. The derivative is the
 /// integral of a vertex's coordinate times the normal over the part of the surface that the body owns. A facet of more

@@ -267,16 +267,17 @@ zeros. For round bodies: d volume / d radius of a sphere or a rounded hull, then
 capsule or a cylinder, then zero; d volume / d (half axes) of an ellipsoid. It is the integral over the common surface of
 the speed at which the surface moves out. Where faces of two bodies lie in one plane, the volume has two one-sided
 derivatives, and the area counts for either body. For groups with a round body, it is that of an enclosing polytope. NaN for
-hulls, which have `vertex_gradients`; for the length 0 of a capsule; for ellipsoids in groups. NaN also for the few pairs
-with an ellipsoid that cannot be sliced. Zeros unless overlapping. `errors.shape_gradient` bounds the errors.)");
+hulls, which have `vertex_gradients`, and for the length 0 of a capsule. NaN also for the few pairs with an ellipsoid that
+cannot be sliced. Zeros unless overlapping. `errors.shape_gradient` bounds the errors.)");
   cls.def_prop_ro(
       "vertex_gradients", [](const Overlap& o) { return by_vertices(o, false); },
       nb::sig("def vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]"),
-      R"(For each body, the (k, 3) d volume / d (position of a vertex), world axes, m², of the rows of `Hull.vertices`; None
-for a body that is no hull. The vertices of a body have the sum gradient[i, :3]. A facet of more than three corners counts as
-a fan of triangles from its first corner. The volume has other one-sided derivatives there, as a vertex that leaves the facet
-may fold it in another way. NaN in groups with a round body; zeros unless overlapping. `errors.vertex_gradients` bounds the
-errors.)");
+      R"(For each body, the (k, 3) d volume / d (position of a vertex), world axes, m², of the rows of `Hull.vertices`, or of
+`RoundedHull.core.vertices`; None for other bodies. The vertices of a body have the sum gradient[i, :3]. A facet of more than
+three corners counts as a fan of triangles from its first corner. The volume has other one-sided derivatives there, as a
+vertex that leaves the facet may fold it in another way. For groups with a round body, it is that of an enclosing polytope, and
+NaN for rounded hulls. NaN also for the few rounded hulls that cannot be sliced. Zeros unless overlapping.
+`errors.vertex_gradients` bounds the errors.)");
 }
 
 /// The error bounds of an overlap.
@@ -341,8 +342,8 @@ them much farther than their own size.)");
   cls.def_prop_ro(
       "vertex_gradients", [](const ErrorsOf& e) { return by_vertices(e.overlap, true); },
       nb::sig("def vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]"),
-      R"(For each body, (k,) m²: bounds of the lengths of the errors of the rows; None for a body that is no hull. Computed on
-each access.)");
+      R"(For each body, (k,) m²: bounds of the lengths of the errors of the rows; None for other bodies than hulls and rounded
+hulls. Computed on each access.)");
   cls.def_prop_ro(
       "depth", [](const ErrorsOf& e) { return of_contact(e, &ContactErrors::depth); },
       nb::sig("def depth(self) -> float | None"),

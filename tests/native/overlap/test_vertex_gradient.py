@@ -137,8 +137,8 @@ def test_vertices_that_the_other_body_does_not_reach():
     assert reached[hull.vertices[:, 2] < 0].all() and not reached.all()
     assert not overlap(hull, Placed(hull, (9, 0, 0))).vertex_gradients[1].any()
     assert overlap(hull, Placed(hull, (9, 0, 0))).errors.vertex_gradients[0].shape == (len(hull.vertices),)
-    group = overlap(hull, Sphere(0.5), Box((1, 1, 1)))
-    assert np.isnan(group.vertex_gradients[0]).all() and np.isnan(group.errors.vertex_gradients[0]).all()
+    rounded = overlap(RoundedHull(hull.vertices, 0.1), Sphere(0.5), Box((1, 1, 1)))
+    assert np.isnan(rounded.vertex_gradients[0]).all() and np.isnan(rounded.errors.vertex_gradients[0]).all()
     assert overlap(Sphere(1), Box((1, 1, 1))).vertex_gradients == [None, None]
 
 
@@ -210,3 +210,112 @@ def test_a_hull_around_a_round_body_or_within_it():
     within = overlap(hull, Placed(Sphere(5.0), (0.5, 0.2, 0)))
     expected = overlap(hull, Box((5, 5, 5))).vertex_gradients[0]
     assert_allclose(within.vertex_gradients[0], expected, rtol=0, atol=1e-14)
+
+
+BESIDE_ROUNDED = {
+    **ROUND,
+    "box": Box((0.5, 0.4, 0.3)),
+    "hull": Hull(HULLS["cube"] * 0.8),
+    "half-space": HalfSpace((0.6, 0, 0.8), 0.1),
+}
+
+
+def placed_by_chance(kind, rng):
+    shape = BESIDE_ROUNDED[kind]
+    if kind == "half-space":
+        return HalfSpace(rng.normal(size=3), 0.1)
+    ahead = rng.normal(size=3)
+    return Placed(shape, rng.uniform(0.1, 0.6) * ahead / np.linalg.norm(ahead), quaternion(rng))
+
+
+@pytest.mark.parametrize("kind", BESIDE_ROUNDED)
+def test_core_of_a_rounded_hull_against_differences_of_volumes(kind):
+    # The core has triangles, so that a vertex that moves folds no facet.
+    rng, step = np.random.default_rng(9), 1e-5
+    rounded = RoundedHull(random_polytope(9, rng=7).vertices * 0.4, 0.2)
+    vertices = rounded.core.vertices
+    assert all(len(facet) == 3 for facet in rounded.core.facets)
+    for _ in range(2):
+        body = placed_by_chance(kind, rng)
+        found = overlap(rounded, body)
+        assert found.status == "overlapping"
+        for v in range(len(vertices)):
+            for axis in range(3):
+                by = step * np.eye(3)[axis] * (np.arange(len(vertices)) == v)[:, None]
+                volumes = [overlap(RoundedHull(vertices + side * by, 0.2), body).volume for side in (-1, 1)]
+                slope = (volumes[1] - volumes[0]) / (2 * step)
+                assert found.vertex_gradients[0][v, axis] == pytest.approx(slope, abs=5e-9)
+
+
+@pytest.mark.parametrize("core", HULLS)
+@pytest.mark.parametrize("kind", BESIDE_ROUNDED)
+def test_vertices_of_a_core_add_up_to_force_moment_and_volume(kind, core):
+    # In all lengths, the volume has the degree 3. Turned about its position, the core turns the rounded hull.
+    rng = np.random.default_rng(10)
+    rounded = RoundedHull(HULLS[core] * 0.7, 0.15)
+    vertices = rounded.core.vertices
+    for depth in (0.2, 1e-2, 1e-5, 1e-8):
+        ahead, turn = rng.normal(size=3), quaternion(rng)
+        ahead /= np.linalg.norm(ahead)
+
+        def at(distance, ahead=ahead, turn=turn):
+            if kind == "half-space":
+                return HalfSpace(ahead, -distance)
+            return Placed(BESIDE_ROUNDED[kind], distance * ahead, turn)
+
+        low, high = 0.0, 5.0
+        for _ in range(50):
+            middle = (low + high) / 2
+            deep = penetration_depth(rounded, at(middle)) > depth
+            low, high = (middle, high) if deep else (low, middle)
+        found = overlap(rounded, at(low))
+        by_vertex, stated = found.vertex_gradients[0], found.errors.vertex_gradients[0]
+        off = by_vertex.sum(0) - found.gradient[0, :3]
+        turning = np.cross(vertices, by_vertex).sum(0) - found.gradient[0, 3:]
+        assert np.isfinite(by_vertex).all() and (stated >= np.linalg.norm(off)).all()
+        assert np.linalg.norm(off) <= 1e-6 * found.area and np.linalg.norm(turning) <= 1e-6 * found.area
+        assert stated.max() <= 1e-4 * found.area
+        if kind == "half-space":
+            lengths = (vertices * by_vertex).sum() + rounded.radius * found.shape_gradient[0, 0]
+            lengths += -low * found.shape_gradient[1, 0]
+            assert lengths == pytest.approx(3 * found.volume, abs=1e-9 * found.area)
+
+
+def test_two_rounded_hulls_that_are_stretched_together():
+    rng = np.random.default_rng(12)
+    for names in (("triangles", "cube"), ("cube", "cube"), ("triangles", "triangles")):
+        bodies = [RoundedHull(HULLS[name] * 0.6 + rng.uniform(-0.3, 0.3, 3), rng.uniform(0.1, 0.3)) for name in names]
+        found = overlap(*bodies)
+        lengths = sum(
+            (body.core.vertices * found.vertex_gradients[i]).sum() + body.radius * found.shape_gradient[i, 0]
+            for i, body in enumerate(bodies)
+        )
+        assert lengths == pytest.approx(3 * found.volume, rel=1e-11)
+
+
+def test_a_rounded_hull_around_a_body_or_within_it():
+    rounded = RoundedHull(HULLS["triangles"], 0.1)
+    for body in BESIDE_ROUNDED.values():
+        if not isinstance(body, HalfSpace):
+            assert not overlap(RoundedHull(rounded.core.vertices * 20, 0.1), body).vertex_gradients[0].any()
+    within = overlap(rounded, Sphere(9.0))
+    lengths = (within.vertex_gradients[0] * rounded.core.vertices).sum() + 0.1 * within.shape_gradient[0, 0]
+    assert lengths == pytest.approx(3 * rounded.volume, rel=1e-12)
+    apart = overlap(rounded, Placed(Sphere(1.0), (9, 0, 0)))
+    assert not apart.vertex_gradients[0].any() and not apart.errors.vertex_gradients[0].any()
+
+
+@pytest.mark.parametrize("kind", ROUND)
+def test_hulls_in_groups_with_a_round_body_against_differences_of_volumes(kind):
+    hull, step = Hull(HULLS["triangles"]), 1e-4
+    rest = Placed(ROUND[kind], (0.2, 0.1, -0.1), (0.3, -0.2, 0.5, 0.7)), Placed(Box((0.5, 0.4, 0.6)), (0, 0.2, 0.1))
+    found = overlap(hull, *rest, tolerance=1e-6)
+    by_vertex, stated = found.vertex_gradients[0], found.errors.vertex_gradients[0]
+    for v in range(0, len(hull.vertices), 5):
+        for axis in range(3):
+            by = step * np.eye(3)[axis] * (np.arange(len(hull.vertices)) == v)[:, None]
+            volumes = [overlap(Hull(hull.vertices + s * by), *rest, tolerance=1e-6).volume for s in (-1, 1)]
+            slope = (volumes[1] - volumes[0]) / (2 * step)
+            assert by_vertex[v, axis] == pytest.approx(slope, abs=1e-4)
+    assert (stated >= np.linalg.norm(by_vertex.sum(0) - found.gradient[0, :3])).all() and stated.max() <= found.area
+    assert found.vertex_gradients[2] is None

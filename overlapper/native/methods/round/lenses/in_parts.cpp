@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "geometry/scratch.h"
 #include "methods/round/lenses/lenses.h"
@@ -6,6 +7,48 @@
 #include "methods/round/pieces/stretched.h"
 
 namespace overlapper::lenses {
+namespace {
+
+/// The part of an ellipsoid's ball that a piece of a rounded hull leaves.
+struct BallInPiece {
+  double volume;  ///< of the common part
+  Mat3 moved;     ///< ∫ y Nᵀ dA over the ball's part of its surface
+  Vec3 force;     ///< ∫ N dA over the round's part
+};
+
+/// The surface of a ball or a cylinder inside an ellipsoid.
+///
+/// Over all of the surface of the common part, ∫ y Nᵀ dA is the volume times the identity. Parts of walls that contain
+/// the axis of a cylinder are plane sections of the ball, and end where planes touch the cylinder. Other walls and
+/// their normals are orthogonal to the axis, and give nothing to ∫ s n dA.
+pieces::RoundSurface surface_in_ellipsoid(const slicing::Round& round, std::span<const slicing::Wall> walls,
+                                          const slicing::Round& ball, const BallInPiece& part,
+                                          const quadric::Stretch& stretch, const Mat3& turn) {
+  const Vec3 h = stretch.half_axes, centre = scaled(h, rounded(round.centre)), force = stretch.normal(part.force);
+  pieces::RoundSurface surface{round.ball, turn * centre, turn * force, {}, {}};
+  if (round.ball) return surface;
+  const Vec3 axis = rounded(round.axis);
+  std::vector<slicing::Wall> within(walls.begin(), walls.end());
+  for (const slicing::Wall& wall : walls) {
+    const Vec3 normal = rounded(wall.normal), own = unit(Vec3{normal.x / h.x, normal.y / h.y, normal.z / h.z});
+    constexpr double kAcross = 0.5;  // walls contain the axis or are orthogonal to it
+    if (std::abs(dot(own, axis)) > kAcross) continue;
+    const Vec3 outwards = scaled(h, unit(cross(axis, own)));
+    for (const Vec3 side : {outwards, -outwards}) {
+      const WideVector unit_side = unit(wide(side));
+      const DoubleDouble reach{round.radius / norm(side)};
+      within.push_back({unit_side, dot(unit_side, round.centre) + reach, slicing::kCut});
+    }
+  }
+  const double v = part.volume;
+  const Mat3 of_walls = pieces::moved_by_walls(ball, within, walls.size());
+  const Mat3 moved = stretch.moved(Mat3{{v, 0, 0}, {0, v, 0}, {0, 0, v}} - part.moved - of_walls);
+  const Vec3 along = transposed(moved) * axis - dot(centre, axis) * force;
+  surface.along = turn * (along - dot(along, axis) * axis), surface.axis = turn * axis;
+  return surface;
+}
+
+}  // namespace
 
 std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& pair) {
   // A ball may be in the ellipsoid's place.
@@ -45,6 +88,7 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
     setting.view = pieces::stretched_view(pieces::PatchView(*pair.patch, 0), turn, stretch, {});
     in.view = View{setting.view.u0, setting.view.v0, setting.view.u, setting.view.v, setting.view.normal};
   }
+  if (pair.rounds) pair.rounds->clear();
   bool contained = false;
   for (size_t i = 0; i < of_other.pieces.size(); ++i) {
     const int number = of_other.pieces[i].round;
@@ -52,12 +96,19 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
     const std::span<const slicing::Wall> walls = of_other.of(static_cast<int>(i));
     if (round && contains_part(in, *round, walls)) round = nullptr, contained = true;
     const double before = sums.totals.volume;
+    const Mat3 moved_before = in.ball_moved;
+    const Vec3 force_before = in.second_force;
     if (round ? !add_part(in, *round, walls, sums)
               : !pieces::add_ball_in_walls(of_ellipsoid.rounds, walls, setting, sums))
       return std::nullopt;
+    if (pair.rounds && round) {
+      const BallInPiece part{sums.totals.volume - before, in.ball_moved - moved_before, in.second_force - force_before};
+      if (part.volume > 0)
+        pair.rounds->push_back(surface_in_ellipsoid(*round, walls, of_ellipsoid.rounds[0], part, stretch, turn));
+    }
     if (pair.moved && !round) {
       const double more = sums.totals.volume - before;
-      const Mat3 flat = pieces::moved_by_walls(of_ellipsoid.rounds[0], walls);
+      const Mat3 flat = pieces::moved_by_walls(of_ellipsoid.rounds[0], walls, walls.size());
       if (more > 0) in.ball_moved = in.ball_moved + (Mat3{{more, 0, 0}, {0, more, 0}, {0, 0, more}} - flat);
     }
   }

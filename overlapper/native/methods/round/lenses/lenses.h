@@ -35,6 +35,7 @@ struct InEllipsoid {
   std::optional<View> view = {};
   double moved = 0;             ///< m: bound of the movement of surfaces by rounding, set by add_part()
   Mat3 ball_moved{{}, {}, {}};  ///< ∫ y Nᵀ dA over the ball's parts, added to by add_part()
+  Vec3 second_force{};          ///< ∫ N dA over the other body's parts, likewise
 };
 
 /// Whether a ball or a cylinder contains all of the ellipsoid that is inside walls, and more: a ball about the disc

@@ -81,6 +81,7 @@ bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slic
   more.pull = found->along_axes(part.force);
   more.moment = found->moment(part.moved, of.stretch);
   of.ball_moved = of.ball_moved + found->moved_along_axes(part.moved);
+  of.second_force += found->along_axes(part.second_force);
   totals.add(more);
   totals.sizes += Moments{volume, abs(more.first), more.squares, abs(more.products)};
   totals.area_error += integral.area_error;

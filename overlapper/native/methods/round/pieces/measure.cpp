@@ -80,14 +80,29 @@ PieceSetting setting_of(const SlicedPair& pair) {
   return setting;
 }
 
+std::vector<RoundSurface> surfaces_of(const Pieces& body, std::span<const Pull> of_pieces) {
+  std::vector<RoundSurface> found;
+  for (size_t i = 0; i < of_pieces.size(); ++i) {
+    if (body.pieces[i].round < 0) continue;
+    const Round& round = body.rounds[body.pieces[i].round];
+    const Vec3 centre = rounded(round.centre), axis = rounded(round.axis);
+    // The moment about the centre is the axis × ∫ s n dA. All normals are orthogonal to the axis.
+    const Pull own = about(of_pieces[i], {}, centre);
+    found.push_back({round.ball, centre, own.force, cross(own.moment, axis), axis});
+  }
+  return found;
+}
+
 /// The measures by add(setting, sums), which adds all pieces. Also sets the patch of the pair.
 template <class Add>
 std::optional<RoundMeasures> measure_both(const SlicedPair& pair, const PieceSetting& setting, const BothPieces& both,
                                           Add add) {
-  const Sums none{{}, pair.patch ? std::optional(*pair.patch) : std::nullopt};
+  Sums none{{}, pair.patch ? std::optional(*pair.patch) : std::nullopt, {}};
+  if (pair.rounds) none.of_pieces.resize(both.a.pieces.size());
   const std::optional<Sums> sums = best_sums(setting, none, add);
   if (!sums) return std::nullopt;
   if (pair.patch) *pair.patch = *sums->patch;
+  if (pair.rounds) *pair.rounds = surfaces_of(both.a, sums->of_pieces);
   return measures_of(sums->totals, std::to_array<const Pieces*>({&both.a, &both.b}), rounded(pair.inside));
 }
 
@@ -132,15 +147,27 @@ struct ManyPieces {
       for (const auto& [i, j] : near) {
         cancellation_point();
         if (both.rounds_of(i, j) != round_ones) continue;
+        const Pull before = pull_of(sums.totals);
         if (round_ones == 2 || (meet(i, j) && !add_in_closed_form(setting, sums))) rest_.push_back({i, j});
+        credit(i, before, sums);
       }
     // A piece that was too inaccurate relative to the pieces before it may be accurate enough relative to all.
-    for (const auto& [i, j] : rest_)
+    for (const auto& [i, j] : rest_) {
+      const Pull before = pull_of(sums.totals);
       if (meet(i, j) && !add_in_closed_form(setting, sums) && !part_.add_sliced(setting, sums)) return false;
+      credit(i, before, sums);
+    }
     return sums.totals.volume > 0;
   }
 
  private:
+  static Pull pull_of(const Totals& totals) { return {totals.pull, totals.moment}; }
+  /// Adds to the pull on piece i of a, if it is wanted.
+  static void credit(int i, const Pull& before, Sums& sums) {
+    if (sums.of_pieces.empty()) return;
+    sums.of_pieces[i] += {sums.totals.pull - before.force, sums.totals.moment - before.moment};
+  }
+
   /// Fills in the data of two pieces; false if their common part is empty.
   bool meet(int i, int j) {
     both.get_rounds(i, j, part_.rounds);
@@ -169,7 +196,7 @@ struct MitredPieces {
 std::optional<RoundMeasures> measure_mitred(const SlicedPair& pair, const EnclosingPolytope& around) {
   // If margins are much larger than the contact is deep, doubles rarely give what rounds leave out.
   constexpr double kMostMargin = 16;
-  if (pair.counted) return std::nullopt;
+  if (pair.counted || pair.rounds) return std::nullopt;
   const double margin = std::max(core_radius(pair.a.shape), core_radius(pair.b.shape));
   if (!(margin <= kMostMargin * around.inner_radius())) return std::nullopt;
   const Scratch<MitredPieces> pieces;
@@ -179,7 +206,7 @@ std::optional<RoundMeasures> measure_mitred(const SlicedPair& pair, const Enclos
   setting.common = &around;
   // Other ways take much longer.
   setting.sure = kMostOpen / 2;
-  Sums sums{{}, pair.patch ? std::optional(*pair.patch) : std::nullopt};
+  Sums sums{{}, pair.patch ? std::optional(*pair.patch) : std::nullopt, {}};
   if (!pieces->mitred.add_all(both.a, both.b, around, setting, sums)) return std::nullopt;
   const Totals& totals = sums.totals;
   if (!(off(totals) <= kMostOpen * totals.volume)) return std::nullopt;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "geometry/measures.h"
 #include "geometry/patch.h"
@@ -31,6 +32,15 @@ struct CountedSurface {
   Vec3 axis;  ///< unit, in the world
 };
 
+/// The surface of a ball or a cylinder of a rounded hull in the common surface.
+struct RoundSurface {
+  bool ball;
+  Vec3 centre;  ///< about the inner point; of a cylinder: the middle of its edge
+  Vec3 force;   ///< m²: ∫ n dA
+  Vec3 along;   ///< m³, of a cylinder: ∫ s n dA, for the distance s along its axis from the centre
+  Vec3 axis;    ///< of a cylinder
+};
+
 /// A pair that overlaps.
 struct SlicedPair {
   const Placed &a, &b;  ///< about the reference
@@ -43,6 +53,8 @@ struct SlicedPair {
   std::optional<CountedSurface> counted = {};  ///< only for balls, capsules, cylinders, rounded hulls and polyhedra
   Mat3* moved = nullptr;  ///< set to ∫ x nᵀ dA over the first body's part of the surface about `inside`, if not null;
                           ///< only for an ellipsoid with a smooth body
+  std::vector<RoundSurface>* rounds = nullptr;  ///< set to the surfaces of the first body's balls and cylinders, if not
+                                                ///< null; only for a rounded hull
 
   /// Sets `moved` from the sum over one body's part along the axes of `turn`. Over all of the surface, the sum is the
   /// volume times the identity.

@@ -288,11 +288,11 @@ bool face_within(std::span<const Wall> walls, size_t i, const WideVector& middle
   return face.size() >= 3;
 }
 
-Mat3 moved_by_walls(const Round& ball, std::span<const Wall> walls) {
+Mat3 moved_by_walls(const Round& ball, std::span<const Wall> walls, size_t count) {
   const Scratch<Work> work;
   auto& [sectioning, part, spare] = *work;
   Mat3 sum{{}, {}, {}};
-  for (size_t i = 0; i < walls.size(); ++i) {
+  for (size_t i = 0; i < count; ++i) {
     cancellation_point();
     const Wall& wall = walls[i];
     if (!face_within(walls, i, ball.centre, ball.radius, part)) continue;

@@ -29,7 +29,7 @@ void add_planar_part(const WidePolygon& polygon, const WideVector& normal, const
 /// there is none. If two walls are in one plane, the first one has the face.
 bool face_within(std::span<const Wall> walls, size_t i, const WideVector& middle, double radius, WidePolygon& face);
 
-/// ∫ x nᵀ dA over the flat boundary of the part of a ball inside walls.
-Mat3 moved_by_walls(const Round& ball, std::span<const Wall> walls);
+/// ∫ x nᵀ dA over the faces of the first `count` walls, of the part of a ball inside all walls.
+Mat3 moved_by_walls(const Round& ball, std::span<const Wall> walls, size_t count);
 
 }  // namespace overlapper::pieces

@@ -4,7 +4,9 @@
 #include <cfloat>
 #include <cmath>
 #include <optional>
+#include <vector>
 
+#include "geometry/measures.h"
 #include "geometry/moments.h"
 #include "geometry/patch.h"
 #include "methods/round/pieces/enclosing_polytope.h"
@@ -74,6 +76,7 @@ inline double missing_area(Vec3 unbalanced, double border) {
 struct Sums {
   Totals totals;
   std::optional<PatchSums> patch;  ///< if wanted
+  std::vector<Pull> of_pieces;     ///< on each piece of the first body, about the inner point; empty unless wanted
 };
 
 /// A patch in the coordinates of pieces: its u and v, and the contribution of an area vector.
