@@ -262,6 +262,12 @@ std::vector<Vec3> gradient_of_round_pair(const Overlap& overlap) {
   return found;
 }
 
+/// The speed at which the tangent plane of an ellipsoid with this unit normal moves out, by its half axes.
+Vec3 speeds_of_plane(const Placed& body, Vec3 half_axes, Vec3 normal) {
+  const Vec3 own = apply_transposed(body.pose.rotation, normal), reach = scaled(half_axes, own);
+  return scaled(reach, own) / norm(reach);
+}
+
 /// The numbers of a shape, by the facets of an enclosing polytope. The area of a facet counts with the speed at which
 /// its plane moves out.
 std::vector<Vec3> gradient_of_group(const Overlap& overlap) {
@@ -274,13 +280,43 @@ std::vector<Vec3> gradient_of_group(const Overlap& overlap) {
     const Vec3 axis = bodies[owner].pose.rotation * tangents::axis(2);
     const double area = area_of(boundary, f), along = std::abs(dot(boundary.planes[f].normal, axis));
     if (std::holds_alternative<Capsule>(shape)) found[owner].y += area * along / 2;
+    if (const Ellipsoid* own = std::get_if<Ellipsoid>(&shape)) {
+      const Vec3 speeds = speeds_of_plane(bodies[owner], own->half_axes, boundary.planes[f].normal);
+      found[owner] += area * (speeds - Vec3{1, 0, 0});
+    }
     if (!std::holds_alternative<Cylinder>(shape)) continue;
     // Planes of a cylinder are across its axis, or along it.
     if (along > 0.5) found[owner] += {-area, area / 2, 0};
   }
   for (size_t i = 0; i < bodies.size(); ++i)
-    if (std::holds_alternative<Ellipsoid>(bodies[i].shape) || std::holds_alternative<Hull>(bodies[i].shape))
-      found[i] = kNone;
+    if (std::holds_alternative<Hull>(bodies[i].shape)) found[i] = kNone;
+  return found;
+}
+
+/// The numbers of ellipsoids in a group by the speed n x / a of a surface that is stretched along a half axis a. NaN
+/// for other bodies.
+std::vector<Vec3> stretched_in_group(const Overlap& overlap) {
+  const std::span<const Placed> bodies = overlap.bodies();
+  const Boundary& boundary = overlap.boundary();
+  std::vector<Vec3> found;
+  for (const Placed& body : bodies) found.push_back(std::holds_alternative<Ellipsoid>(body.shape) ? Vec3{} : kNone);
+  for (int f = 0; f < static_cast<int>(boundary.planes.size()); ++f) {
+    const Placed& body = bodies[boundary.owner[f]];
+    const Ellipsoid* own = std::get_if<Ellipsoid>(&body.shape);
+    if (!own) continue;
+    const auto ring = boundary.facet(f);
+    const auto corner = [&](int i) { return boundary.vertices[ring[i]] - body.position; };
+    const Vec3 normal = boundary.planes[f].normal;
+    Vec3 first;
+    for (int i = 1; i + 1 < static_cast<int>(ring.size()); ++i) {
+      const double twice = dot(cross(corner(i) - corner(0), corner(i + 1) - corner(0)), normal);
+      first += twice / 6 * (corner(0) + corner(i) + corner(i + 1));
+    }
+    const Vec3 moved =
+        scaled(apply_transposed(body.pose.rotation, normal), apply_transposed(body.pose.rotation, first));
+    const Vec3 h = own->half_axes;
+    found[boundary.owner[f]] += {moved.x / h.x, moved.y / h.y, moved.z / h.z};
+  }
   return found;
 }
 
@@ -319,8 +355,9 @@ std::vector<Vec3> shape_gradient_errors(const Overlap& overlap) {
   }
   const std::vector<Vec3> found = shape_gradient(overlap);
   const bool enclosed = overlapping && !flat && !overlap.pair();
-  std::vector<Vec3> sides;
-  if (overlapping && flat) sides = areas_of_sides(overlap.boundary(), bodies);
+  std::vector<Vec3> second;
+  if (overlapping && flat) second = areas_of_sides(overlap.boundary(), bodies);
+  if (enclosed) second = stretched_in_group(overlap);
   const Errors errors = enclosed ? measured_with_errors(overlap.region(), bodies).errors : overlap.errors();
   std::vector<Vec3> bounds;
   for (size_t i = 0; i < bodies.size(); ++i) {
@@ -329,7 +366,8 @@ std::vector<Vec3> shape_gradient_errors(const Overlap& overlap) {
     const int numbers = numbers_of(bodies[i].shape);
     const auto bound = [&](int k) {
       if (k >= numbers) return 0.0;
-      const double apart = sides.empty() ? 0 : std::abs(found[i][k] - sides[i][k]);
+      const bool twice = !second.empty() && !std::isnan(second[i][k]);
+      const double apart = twice ? std::abs(found[i][k] - second[i][k]) : 0;
       return std::isnan(found[i][k]) ? kNoDerivative : area + apart;
     };
     bounds.push_back({bound(0), bound(1), bound(2)});

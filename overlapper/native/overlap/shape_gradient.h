@@ -22,9 +22,9 @@ int axis_across(const Placed& box, Vec3 normal);
 /// - An ellipsoid has the half axes.
 /// - A half-space has the offset along its unit normal.
 ///
-/// NaN for hulls; vertex_gradients() has the derivatives by a hull's vertices. NaN also for the length 0 of a capsule,
-/// and for ellipsoids in groups. Groups with a round body have the numbers of the polytope that encloses the common
-/// set.
+/// NaN for hulls; vertex_gradients() has the derivatives by a hull's vertices. NaN also for the length 0 of a capsule.
+/// Groups with a round body have the numbers of the polytope that encloses the common set: each of its planes touches
+/// the body that owns it, and moves with that body.
 ///
 /// A surface moves along its normal at some speed. The volume grows at the rate of the integral of that speed over the
 /// part of the surface that the body owns. The sides of a box across one axis move at the speed 1 if that half extent
@@ -35,9 +35,9 @@ int axis_across(const Placed& box, Vec3 normal);
 /// faces within the ellipsoid have closed forms.
 std::vector<Vec3> shape_gradient(const Overlap& overlap);
 
-/// m²: bounds of the errors of shape_gradient(). They are the bounds of the areas that bodies own. For boxes, the
-/// difference from a second way is added. Pairs with an ellipsoid add the error of the volume over the size. NaN where
-/// there is no derivative.
+/// m²: bounds of the errors of shape_gradient(). They are the bounds of the areas that bodies own. For boxes, and
+/// for ellipsoids in groups, the difference from a second way is added. Pairs with an ellipsoid add the error of the
+/// volume over the size. NaN where there is no derivative.
 std::vector<Vec3> shape_gradient_errors(const Overlap& overlap);
 
 /// The volume of a pair and its derivatives.

@@ -253,8 +253,8 @@ def test_euler_holds_for_pairs_with_an_ellipsoid_at_any_depth(kind):
         assert off <= 1e-7 * found.area
 
 
-def test_ellipsoids_in_groups_have_no_derivative():
-    assert np.isnan(overlap(Ellipsoid((1, 1, 2)), Sphere(1.0), Box((1, 1, 1))).shape_gradient[0]).all()
+def test_an_ellipsoid_around_the_others_of_a_group_bounds_nothing():
+    assert not overlap(Ellipsoid((1, 1, 2)), Sphere(0.9), Box((0.8, 1, 1))).shape_gradient[0].any()
 
 
 @pytest.mark.parametrize("case", [case for case in PAIRS if case.truth.dimension == 3], ids=repr)
@@ -386,3 +386,17 @@ def test_weights_that_do_not_fit_are_refused():
         ValueError, match=r"^weights must be an array of numbers, one for each pair, not of shape \(2,\)"
     ):
         arrays.volume_gradient(box, box, [1, 2])
+
+
+def test_half_axes_in_groups_against_differences_of_volumes():
+    # The group is measured by enclosing polytopes.
+    step, tolerance = 1e-3, 1e-6
+    rest = Placed(Box((0.5, 0.4, 0.6)), (0.3, 0.1, -0.2), (0.3, -0.2, 0.5, 0.7)), Placed(Sphere(0.6), (0.1, -0.2, 0.1))
+    found = overlap(Ellipsoid(HALF_AXES), *rest, tolerance=tolerance)
+    for k in range(3):
+        by = step * np.eye(3)[k]
+        volumes = [overlap(Ellipsoid(HALF_AXES + s * by), *rest, tolerance=tolerance).volume for s in (-1, 1)]
+        slope = (volumes[1] - volumes[0]) / (2 * step)
+        assert found.shape_gradient[0, k] == pytest.approx(slope, abs=1e-3)
+        assert abs(found.shape_gradient[0, k] - slope) <= found.errors.shape_gradient[0, k] + 1e-4
+    assert found.errors.shape_gradient[0].min() > 0 and found.errors.shape_gradient[0].max() < found.area
