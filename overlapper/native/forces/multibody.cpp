@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 
 namespace overlapper {
@@ -57,9 +58,10 @@ void invert(std::vector<double>& m, int n) {
   std::vector<double> column(n);
   for (int c = 0; c < n; ++c) {
     if (held[c]) continue;
-    for (int i = 0; i < n; ++i) {
+    std::fill(column.begin(), column.begin() + c, 0.0);
+    for (int i = c; i < n; ++i) {
       double sum = i == c ? 1 : 0;
-      for (int k = 0; k < i; ++k) sum -= at(i, k) * column[k];
+      for (int k = c; k < i; ++k) sum -= at(i, k) * column[k];
       column[i] = held[i] ? 0 : sum / at(i, i);
     }
     for (int i = n - 1; i >= 0; --i) {
@@ -229,13 +231,17 @@ void Multibodies::find_inverse_mass(int number) {
     return;
   }
   std::vector<double> rows(size_t(6) * n);
+  std::vector<int> columns(kOfBase);  // that move a link
+  std::iota(columns.begin(), columns.end(), 0);
   for (int i = body.first_link; i < body.first_link + body.links; ++i) {
     const TreeLink& link = links_[i];
     if (!(link.mass > 0)) continue;
     jacobian(i, frames_[i].translation, rows);
+    columns.resize(kOfBase);
+    columns.insert(columns.end(), moved_[i].begin(), moved_[i].end());
     const Mat3& turn = frames_[i].rotation;
     // Maps angular rows to components along the principal axes, times the roots of the moments.
-    for (int c = 0; c < n; ++c) {
+    for (int c : columns) {
       const Vec3 spin{rows[size_t(3) * n + c], rows[size_t(4) * n + c], rows[size_t(5) * n + c]};
       const Vec3 own = apply_transposed(turn, spin);
       for (int axis = 0; axis < 3; ++axis) {
@@ -244,10 +250,10 @@ void Multibodies::find_inverse_mass(int number) {
       }
     }
     for (int r = 0; r < 6; ++r)
-      for (int a = 0; a < n; ++a) {
+      for (int a : columns) {
         const double left = rows[size_t(r) * n + a];
         if (left == 0) continue;
-        for (int b = 0; b < n; ++b) m[size_t(a) * n + b] += left * rows[size_t(r) * n + b];
+        for (int b : columns) m[size_t(a) * n + b] += left * rows[size_t(r) * n + b];
       }
   }
   if (!(links_[body.first_link].mass > 0)) {
