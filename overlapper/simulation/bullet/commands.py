@@ -13,7 +13,7 @@ ARRAYS = frozenset({"setJointMotorControlArray", "setJointMotorControlMultiDofAr
 MOTORS = ARRAYS | {"setJointMotorControl2", "setJointMotorControlMultiDof"}
 PUSHES = frozenset({"applyExternalForce", "applyExternalTorque"})
 
-COMMANDS = MOTORS | PUSHES | {"changeConstraint", "resetSimulation", "stepSimulation"}
+COMMANDS = MOTORS | PUSHES | {"changeConstraint", "resetSimulation"}
 
 # The default gains of pybullet: the fraction of an error that a step removes.
 DEFAULT_GAINS = {"positionGain": 0.1, "velocityGain": 1.0}
@@ -90,6 +90,8 @@ class Commands:
             self.states.append(("restored", arguments.get("stateId")))
         elif name == "removeState":
             self.states.append(("removed", arguments["stateUniqueId"]))
+        if name == "stepSimulation":
+            self.stepped()
         if name not in COMMANDS:
             return
         # The script may change its lists later.
@@ -105,9 +107,6 @@ class Commands:
             constraint = arguments["userConstraintUniqueId"]
             before = self._lasting.get(constraint, command)[1]
             self._keep([constraint], (name, before | command[1]))
-        elif name == "stepSimulation":
-            self.stepped()
-            return
         else:
             self._lasting, self._momentary = {}, []
         # pybullet took the command for the script's step length, which is not that of our substeps.

@@ -36,6 +36,7 @@ class Stepping:
         self._commands = recorder.commands if recorder else Commands(client)
         self._memory = Memory(self._commands.states)
         self._response = Response(client)
+        self._length = 0.0  # of the simulator's steps, within a step
 
     def dynamics(self, bodies: Sequence[int]) -> BulletDynamics:
         self._dynamics = BulletDynamics(self._client, bodies)
@@ -76,15 +77,21 @@ class Stepping:
     prepare = pose
 
     def begin(self, length: float, duration: float, first: bool) -> None:
-        pybullet.setTimeStep(length, self._client)
+        self._set(length, duration if first else self._length)
         self._commands.prepare(length, first, share=length / duration)
 
     def step(self) -> None:
         unheard("stepSimulation")(self._client)
 
     def stepped(self, duration: float) -> None:
-        pybullet.setTimeStep(duration, self._client)
+        self._set(duration, self._length)
         self._commands.stepped()
+
+    def _set(self, length: float, before: float) -> None:
+        """Set the length (s) of the simulator's steps, which was `before`."""
+        self._length = length
+        if length != before:
+            pybullet.setTimeStep(length, self._client)
 
     def announce_begin(self) -> None:
         tell(BEGINS, {"physicsClientId": self._client})
