@@ -1567,18 +1567,32 @@ class ContactSolver:
         (rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.
         """
 
+    @property
+    def depths(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p,) the mean depth of each patch in m: its volume over its area, 0 without a patch.
+        """
+
+    def travel(self, duration: float, velocity: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        How far bodies move within `duration` (s) at this `velocity` of all coordinates.
+
+        (p, 2): how far the two surfaces of each patch move over each other at its centroid, in m, and how far they turn, in
+        rad. (n, 2): the same for the centre of mass of each link in the world.
+        """
+
     def ahead(self, duration: float, velocity: numpy.typing.ArrayLike, links: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         (k, 3) positions in m and (k, 4) quaternions xyzw where shapes on these `links`, (k,) as for `place`, come to after
         `duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.
         """
 
-    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike, distributed: bool, ahead: Sequence[Any] | None = None) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int, float]:
+    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: Sequence[Any] | None = None) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int, float]:
         """
         The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
-        without the patches; rows that are `damped` choose stability over energy. `ahead` has a pair for each link: the position
-        of its centre of mass after the step, in m, if the coordinates keep their velocity, and the quaternion xyzw of its rotation
-        until then. The trees of a simulator need it if there are patches.
+        without the patches. Rows that are `damped` choose stability over energy; without the argument, no row does. `ahead` has
+        a pair for each link: the position of its centre of mass after the step, in m, if the coordinates keep their velocity,
+        and the quaternion xyzw of its rotation until then. The trees of a simulator need it if there are patches.
 
         (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
         last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and

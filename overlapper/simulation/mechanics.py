@@ -44,6 +44,10 @@ class Dynamics(Protocol):
     def place(self) -> Mapping[LinkKey, int]:
         """The index of each link in `links`."""
 
+    @property
+    def version(self) -> int:
+        """A number that changes with friction, resistance and weights, at the earliest in `read`."""
+
     def friction(self, pairs: NDArray[np.int64]) -> Array:
         """(p,) the simulator's coefficients of friction of `pairs` (p, 2), which are pairs of indices in `links`."""
 
@@ -52,6 +56,9 @@ class Dynamics(Protocol):
 
     def weights(self) -> Array:
         """(n,) for each of `links`: the weight in N of its whole body with all joints, 0 if forces do not move it."""
+
+    def jointed(self) -> NDArray[np.bool_]:
+        """(n,) for each of `links`: whether its body has joints that move."""
 
     def read(self) -> bool:
         """Read masses and friction again. True if masses have changed, so that there is a new solver."""

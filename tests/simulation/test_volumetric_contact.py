@@ -26,6 +26,17 @@ def test_a_tilted_cube_comes_to_rest_as_deep_as_its_weight_asks(client, stiffnes
     assert contact.on(cube)[0] == pytest.approx([0, 0, G], abs=1e-7)
 
 
+def test_a_cube_that_rocks_on_its_face_comes_to_rest_in_whole_steps(client):
+    """The centroid of its volume goes to and fro faster than the cube. It must not pass for a rolling contact."""
+    pybullet.setGravity(0, 0, -G, physicsClientId=client)
+    ground(client)
+    cube = box(client, 0.05, position=[0, 0, 0.051], orientation=pybullet.getQuaternionFromEuler([1e-3, 0, 0]))
+    with VolumetricContact(Bodies(client), stiffness=1e8, substeps=1) as contact:
+        for _ in range(240):
+            contact.step()
+    assert np.abs(pybullet.getBaseVelocity(cube, physicsClientId=client)).max() < 1e-7
+
+
 @pytest.mark.parametrize("stiffness", [1e7, 1e8, 1e9])
 @pytest.mark.parametrize("drop", [0.01, 0.1, 0.5])
 def test_a_falling_body_bounces_back_to_about_the_same_height(client, stiffness, drop):

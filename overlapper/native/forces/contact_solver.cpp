@@ -243,6 +243,28 @@ void ContactSolver::add_side(Row& row, int number, std::span<const double> jacob
       }
 }
 
+std::vector<ContactSolver::Travel> ContactSolver::travel_of_patches(double duration,
+                                                                    std::span<const double> velocity) const {
+  std::vector<Travel> found;
+  found.reserve(rows_.size());
+  for (const Row& row : rows_) {
+    const auto [n, t] = slip_of(row, velocity);
+    found.push_back({duration * norm(Vec3{n[0], t[0], t[1]}), duration * norm(Vec3{n[1], n[2], t[2]})});
+  }
+  return found;
+}
+
+std::vector<ContactSolver::Travel> ContactSolver::travel_of_links(double duration,
+                                                                  std::span<const double> velocity) const {
+  std::vector<Travel> found;
+  found.reserve(bodies_.links());
+  for (int link = 0; link < bodies_.links(); ++link) {
+    const auto [linear, angular] = bodies_.twist(link, velocity);
+    found.push_back({duration * norm(linear), duration * norm(angular)});
+  }
+  return found;
+}
+
 // ------------------------------------------------------------------------------------------------------------- solving
 
 ContactSolver::Six ContactSolver::slip_of(const Row& row, std::span<const double> velocity) const {
@@ -294,13 +316,14 @@ ContactSolver::Six ContactSolver::known_wrench(size_t patch) const {
 
 /// The share of a body's spin that moves its surface away from the contact. It is 1 if the contact keeps its place. An
 /// edge about which the body tips does so. It is 0 if the contact goes on with the centre of the body, as below a
-/// wheel. The velocities are those of the centre, and of the surface at the contact relative to the centre.
+/// wheel. It may be anything below a face that rocks: its centroid goes to and fro much faster than the surface. The
+/// velocities are those of the centre, and of the surface at the contact relative to the centre.
 double ContactSolver::staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const {
   const Known* last = known(patch.key);
   if (!last || !(norm2(by_spin) > 0)) return 0;
   const Vec3 moved = patch.centroid - last->centroid;
   if (norm2(moved) == 0) return last->staying;  // the same poses again, or no motion
-  return std::clamp(overlapper::dot(moved / last->duration - centre_velocity, by_spin) / norm2(by_spin), 0.0, 1.0);
+  return overlapper::dot(moved / last->duration - centre_velocity, by_spin) / norm2(by_spin);
 }
 
 /// Without it, a body on a turntable leaves its circle along a tangent in every step. The body that turns less carries
@@ -323,7 +346,7 @@ ContactSolver::Drift ContactSolver::drift(size_t patch, const Step& step, std::s
   const Vec3 arm = p.centroid - bodies_.centre(link[other]), beside = spin[other] - spin[carrier];
   const Vec3 by_spin = cross(spin[other], arm);
   const double stays = staying(p, velocity[other], by_spin);
-  const Vec3 turning = cross(spin[carrier], cross(beside, arm)) + stays * cross(beside, by_spin);
+  const Vec3 turning = cross(spin[carrier], cross(beside, arm)) + std::clamp(stays, 0.0, 1.0) * cross(beside, by_spin);
   const Vec3 along = bend[0] - bend[1] + around + (other == 0 ? h / 2 : -h / 2) * turning;
   return {rows_[patch].local({along, twist[0] - twist[1]}).tangential, stays};
 }
@@ -333,10 +356,12 @@ Pressure::Damping ContactSolver::damping(size_t patch, std::span<const Six> befo
   const Row& row = rows_[patch];
   if (!(row.damping > 0)) return {};
   // The patches of two links have the same numbers, so that parts of a body, and prisms below it, act as a whole.
-  double approach = before[patch].normal[0], staying = drifts[patch].staying;
+  // A face that rocks keeps its place.
+  const auto kept = [&](size_t i) { return drifts[i].staying < -1 ? 1 : std::clamp(drifts[i].staying, 0.0, 1.0); };
+  double approach = before[patch].normal[0], staying = kept(patch);
   for (const auto [other, part] : row.damped_with) {
     approach += part / row.damping * (before[other].normal[0] - before[patch].normal[0]);
-    staying += part / row.damping * (drifts[other].staying - drifts[patch].staying);
+    staying += part / row.damping * (kept(other) - kept(patch));
   }
   return {row.damping, approach, staying};
 }

@@ -34,6 +34,17 @@ class ContactSolver {
   /// oscillation of the patch's bodies on all of their patches is faster.
   std::vector<double> place(std::span<const Pose> frames, std::vector<ElasticPatch> patches);
 
+  /// A distance and an angle.
+  struct Travel {
+    double length, angle;  ///< m, rad
+  };
+
+  /// How far the surfaces of each patch move over each other within `duration` (s) at this velocity of all coordinates.
+  std::vector<Travel> travel_of_patches(double duration, std::span<const double> velocity) const;
+
+  /// How far the centre of mass of each link moves within `duration` (s), and how far the link turns.
+  std::vector<Travel> travel_of_links(double duration, std::span<const double> velocity) const;
+
   struct Step {
     double duration;                       ///< s
     std::span<const double> velocity;      ///< of all coordinates, at the beginning
@@ -108,7 +119,7 @@ class ContactSolver {
   /// How much the mean of the slip over a step differs from the slip at its beginning, because bodies turn.
   struct Drift {
     Three slip;      ///< tangential
-    double staying;  ///< the share of a spin that moves a body's surface away from the contact
+    double staying;  ///< see staying()
   };
 
   /// The laws of a patch in a step, and its present wrench.

@@ -167,8 +167,10 @@ nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_give
   const size_t coordinates = solver.bodies().coordinates(), count = solver.patches().size();
   const auto velocity = numbers(velocity_given, "velocity", coordinates);
   const auto acceleration = numbers(acceleration_given, "acceleration", coordinates);
-  std::vector<char> damped;
-  for (double each : numbers(damped_given, "damped", count)) damped.push_back(each != 0);
+  std::vector<char> damped(count);
+  if (!damped_given.is_none())
+    std::ranges::transform(numbers(damped_given, "damped", count), damped.begin(),
+                           [](double each) { return each != 0; });
   std::vector<MovedOn> ahead;
   if (!ahead_given.is_none()) {
     for (nb::handle each : ahead_given) {
@@ -203,6 +205,19 @@ nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_give
                         to_numpy<Matrix>(std::move(links), {rows, 6}),
                         to_numpy<Vector>(std::move(solution.acceleration), {coordinates}), solution.sweeps,
                         solution.residual);
+}
+
+/// Rows of lengths and angles: of patches, and of links.
+nb::tuple travel(const ContactSolver& solver, double duration, nb::handle velocity_given) {
+  const auto velocity = numbers(velocity_given, "velocity", solver.bodies().coordinates());
+  const auto rows = [](const std::vector<ContactSolver::Travel>& found) {
+    std::vector<double> flat;
+    for (const auto [length, angle] : found) flat.insert(flat.end(), {length, angle});
+    const size_t count = found.size();
+    return to_numpy<Matrix>(std::move(flat), {count, 2});
+  };
+  return nb::make_tuple(rows(solver.travel_of_patches(duration, velocity)),
+                        rows(solver.travel_of_links(duration, velocity)));
 }
 
 /// The poses of shapes after `duration` at the present velocities of their links.
@@ -294,6 +309,24 @@ against rolling and against spinning over the force. Friction on the area resist
 and zeros for other shapes. A prism presses with its top alone, because its vertical walls are inside the field. The
 answer (p,) is the square of a frequency,
 (rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.)");
+  cls.def_prop_ro(
+      "depths",
+      [](const ContactSolver& self) {
+        std::vector<double> found;
+        for (const ElasticPatch& each : self.patches())
+          found.push_back(each.area > 0 ? each.force / each.stiffness / each.area : 0);
+        const size_t count = found.size();
+        return nb::cast(to_numpy<Vector>(std::move(found), {count}), nb::rv_policy::move);
+      },
+      nb::sig("def depths(self) -> numpy.typing.NDArray[numpy.float64]"),
+      "(p,) the mean depth of each patch in m: its volume over its area, 0 without a patch.");
+  cls.def("travel", &travel, "duration"_a, "velocity"_a,
+          nb::sig("def travel(self, duration: float, velocity: numpy.typing.ArrayLike) -> "
+                  "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]"),
+          R"(How far bodies move within `duration` (s) at this `velocity` of all coordinates.
+
+(p, 2): how far the two surfaces of each patch move over each other at its centroid, in m, and how far they turn, in
+rad. (n, 2): the same for the centre of mass of each link in the world.)");
   cls.def(
       "ahead", &ahead, "duration"_a, "velocity"_a, "links"_a, "positions"_a, "orientations"_a,
       nb::sig("def ahead(self, duration: float, velocity: numpy.typing.ArrayLike, links: "
@@ -303,19 +336,19 @@ answer (p,) is the square of a frequency,
       R"((k, 3) positions in m and (k, 4) quaternions xyzw where shapes on these `links`, (k,) as for `place`, come to after
 `duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.)");
   cls.def(
-      "solve", &solve, "duration"_a, "velocity"_a, "acceleration"_a, "damped"_a, "distributed"_a,
+      "solve", &solve, "duration"_a, "velocity"_a, "acceleration"_a, "damped"_a.none(), "distributed"_a,
       "ahead"_a.none() = nb::none(),
       nb::sig("def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: "
-              "numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike, distributed: bool, ahead: "
+              "numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: "
               "collections.abc.Sequence[typing.Any] | None = None) -> "
               "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.float64], int, float]"),
       R"(The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
-without the patches; rows that are `damped` choose stability over energy. `ahead` has a pair for each link: the position
-of its centre of mass after the step, in m, if the coordinates keep their velocity, and the quaternion xyzw of its rotation
-until then. The trees of a simulator need it if there are patches.
+without the patches. Rows that are `damped` choose stability over energy; without the argument, no row does. `ahead` has
+a pair for each link: the position of its centre of mass after the step, in m, if the coordinates keep their velocity,
+and the quaternion xyzw of its rotation until then. The trees of a simulator need it if there are patches.
 
 (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
 last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and

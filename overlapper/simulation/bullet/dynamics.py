@@ -41,18 +41,26 @@ class BulletDynamics:
         self.place = {each: k for k, each in enumerate(self.links)}
         self._masses: list[Any] = [None]  # equals no real list of masses, so that the first `read` makes a solver
         self._surface: Array = np.zeros((len(self.links), len(SURFACE)))
+        self._told: list[Any] = []
+        self.version = 0
         self.read()
 
     def read(self) -> bool:
         """Read masses and friction again. True if a mass or inertia has changed, so that there is a new solver."""
-        told = [pybullet.getDynamicsInfo(id, link, self._client) for id, link in self.links]
+        read, client = pybullet.getDynamicsInfo, self._client
+        told = [read(id, link, client) for id, link in self.links]
+        gravity = self._gravity()
+        if [gravity, told] == self._told:
+            return False
+        self._told = [gravity, told]
+        self.version += 1
         self._surface = np.array([[each[k] for k in SURFACE] for each in told]).reshape(-1, len(SURFACE))
         masses = [(each[MASS], each[INERTIA]) for each in told]
         changed = masses != self._masses
         if changed:
             self._masses = masses
             self._model()
-        self._weights = (np.linalg.norm(self._gravity()) or G) * self._moved_masses()
+        self._weights = (np.linalg.norm(gravity) or G) * self._moved_masses()
         return changed
 
     def known(self) -> Known:
@@ -84,9 +92,17 @@ class BulletDynamics:
         """(n,) the weights of the links' bodies in N, 0 for bodies that nothing moves."""
         return self._weights
 
+    def jointed(self) -> NDArray[np.bool_]:
+        """(n,) whether the links' bodies have joints that move."""
+        jointed = self._jointed()
+        return np.array([id in jointed for id, _ in self.links], dtype=bool)
+
+    def _jointed(self) -> set[int]:
+        return {id for id, _, _ in (*self._single, *self._spherical)}
+
     def _moved_masses(self) -> Array:
         """(n,) the masses of the links' bodies, 0 for bodies that forces do not move."""
-        jointed = {id for id, _, _ in (*self._single, *self._spherical)}
+        jointed = self._jointed()
         of_body = {}
         for id, joints in self._joints.items():
             masses = [self._masses[self.place[id, link]][MASS] for link in (BASE, *joints)]

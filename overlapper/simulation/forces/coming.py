@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from overlapper import Overlaps
 from overlapper.simulation.asked_pairs import Among
@@ -21,12 +23,27 @@ STILL = 1e-9
 BISECTIONS = 8
 
 
-def coming(
-    masses: Masses, frames: Sequence[Pose], now: Overlaps, duration: float, velocity: Array, among: Among
-) -> tuple[float, float]:
-    """Return the squares of two frequencies (rad/s): of all overlaps that come within `duration`, and of small bodies.
+class Coming(NamedTuple):
+    """The contacts that come within a step."""
 
-    The first is the highest of the overlaps. The second is that of bodies which are swallowed within the duration (s).
+    meets: bool = False
+    """Whether a pair that does not overlap yet overlaps at the end of the step."""
+    highest: float = 0.0
+    """The square of the highest frequency (rad/s) of all overlaps. 0 if nobody asked for it."""
+    swallowed: float = 0.0
+    """The square of the frequency of small bodies that are swallowed within the step."""
+
+
+def coming(
+    masses: Masses,
+    frames: Sequence[Pose],
+    now: Overlaps,
+    duration: float,
+    velocity: Array,
+    among: Among,
+    frequencies: bool,
+) -> Coming:
+    """Return the contacts that come within `duration` (s), with their `frequencies` or without.
 
     `frames` are the frames of the links. `now` are the overlaps in these frames. All coordinates are assumed to keep
     their `velocity`.
@@ -36,16 +53,20 @@ def coming(
     """
     # Bodies at rest bring no new contact.
     if np.abs(velocity).max(initial=0.0) * duration < STILL:
-        return 0.0, 0.0
-    solver = masses.dynamics.solver.copy()
-    highest = 0.0
+        return Coming()
+    if not frequencies and not masses.moves_far(duration, velocity):
+        return Coming()
+    solver = masses.dynamics.solver.copy() if frequencies else None
+    meets, highest = False, 0.0
     known: set[tuple[int, int]] | None = None
     # A small and fast body is swallowed within the step: then it counts when it was half in, and for how long.
     lost: set[tuple[int, int]] = set()
     early, late, part = 0.0, 1.0, 1.0
     for _ in range(BISECTIONS):
         found = masses.ahead(part * duration, velocity, among)
-        highest = max(highest, float(masses.place(solver, frames, found)[0].max(initial=0.0)))
+        if solver:
+            highest = max(highest, float(masses.place(solver, frames, found)[0].max(initial=0.0)))
+        meets = meets or not np.isin(_codes(found), _codes(now)).all()
         swallowed = _swallowed(found)
         if swallowed:
             known = _swallowed(now) if known is None else known
@@ -57,7 +78,7 @@ def coming(
         else:
             break
         part = (early + late) / 2
-    return highest, (2 / (late - early) / duration) ** 2 if lost else 0.0
+    return Coming(meets, highest, (2 / (late - early) / duration) ** 2 if lost else 0.0)
 
 
 def followed(frequency2: float, duration: float) -> int:
@@ -70,3 +91,9 @@ def _swallowed(found: Overlaps) -> set[tuple[int, int]]:
     area = found.gradient[:, 1, :3]
     rows = (found.volume > 0) & ((area * area).sum(axis=1) <= (NO_PATCH * found.area) ** 2)
     return {(a, b) for a, b in found.pairs[rows].tolist()} if rows.any() else set()
+
+
+def _codes(found: Overlaps) -> NDArray[np.int64]:
+    """Return a number for the pair of each row that shares a volume."""
+    pairs = found.pairs[found.volume > 0].astype(np.int64)
+    return np.asarray(pairs[:, 0] << 32 | pairs[:, 1])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from overlapper.simulation.asked_pairs import Among, listed
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.contacts import Contacts
-from overlapper.simulation.forces.coming import coming, followed
+from overlapper.simulation.forces.coming import Coming, coming, followed
 from overlapper.simulation.forces.forces import Forces, mean
 from overlapper.simulation.forces.masses import Masses
 from overlapper.simulation.forces.pads import Pad
@@ -61,8 +61,9 @@ class VolumetricContact:
         lateralFriction, in MuJoCo the sliding friction of the two geoms. With "distributed", friction acts at points
         spread over the patch, with the simulator's coefficients. This is more exact where bodies slip and spin at once.
     substeps : int or 'auto', default 'auto'
-        Number of parts of a step of the simulator. 'auto': it follows from the stiffness and the masses, anew in every
-        step. Without a `dissipation`, it is 4 at most, or more for small bodies that would pass through others.
+        Number of parts of a step of the simulator. 'auto': with a `dissipation`, it follows from the stiffness and the
+        masses, anew in every step. Without one, it follows from the motion. It is 1 for bodies that rest, 4 at most for
+        others and for robots, and more for small bodies that would pass through others.
     restitution : float or callable, optional
         The speed after an impact over the speed before it. Slower impacts than 0.2 m/s have none. Default: that of the
         simulator. In pybullet it is the product of the two links' restitution, which is 0 unless it is set. In MuJoCo
@@ -217,10 +218,11 @@ class VolumetricContact:
                 frequency2 = self._place(lost)
                 if not self._planned:
                     # Once in a step is enough for what comes; a length that changes within a swing costs energy.
-                    coming, swallowed = (0.0, 0.0) if taken else self._coming(duration, velocity)
-                    highest = max(frequency2.max(initial=0.0), coming, swallowed)
-                    if not taken or highest * length**2 > 1:
-                        length = left / self._needed(highest, swallowed, left, taken)
+                    ahead = Coming() if taken else self._coming(duration, velocity)
+                    planned = round(left / length) if taken else 0
+                    parts = self._needed(frequency2, velocity, ahead, left, taken, planned)
+                    if parts > planned:
+                        length = left / parts
                 wrenches = self._solve(length, velocity, frequency2)
                 self._mechanics.begin(length, duration, first=not taken)
                 self._masses.dynamics.apply(wrenches, self._frames)
@@ -231,6 +233,7 @@ class VolumetricContact:
         finally:
             self._mechanics.stepped(duration)
         self.substeps = taken
+        self._tell_of_depth(duration)
         self._others.left_at(self._masses.velocity()[0])
         self._mechanics.announce()
 
@@ -250,8 +253,9 @@ class VolumetricContact:
         velocity, lost = self._velocity()
         frequency2 = self._place(lost)
         duration = self.bodies.time_step
-        substeps = self._planned or self._needed(frequency2.max(initial=0.0), 0.0, duration, 0)
+        substeps = self._planned or self._needed(frequency2, velocity, Coming(), duration)
         self._solve(duration / substeps, velocity, frequency2)
+        self._tell_of_depth(duration)
         return self._found
 
     def mean(self) -> Forces:
@@ -400,6 +404,7 @@ class VolumetricContact:
             velocity, lost = self._velocity()
             frequency2 = self._place(lost)
             wrenches = self._solve(self.bodies.time_step, velocity, frequency2, whole=True)
+            self._tell_of_depth(self.bodies.time_step)
         finally:
             self._told.further = 0
         self._masses.dynamics.apply(wrenches, self._frames)
@@ -458,26 +463,42 @@ class VolumetricContact:
         frequency2, self._stiffness = self._masses.place(solver, self._frames, self._contacts.overlaps)
         return frequency2
 
-    def _needed(self, highest: float, swallowed: float, left: float, taken: int) -> int:
+    def _needed(
+        self, frequency2: Array, velocity: Array, coming: Coming, left: float, taken: int = 0, planned: int = 0
+    ) -> int:
         """Return the number of substeps for the time (s) that is `left`, after those that are `taken`.
 
-        `highest` and `swallowed` are squares of frequencies, of everything and of bodies that are swallowed.
+        It need not be known below the number that was `planned` before.
+
+        `frequency2` (p,) are squares of frequencies of the contacts now. Without a `dissipation` contacts do not swing:
+        the number then follows from how far surfaces move over each other.
         """
         most = max(1, MOST_SUBSTEPS - taken)
-        if self._layers.recovers:
-            most = max(1, FEW_SUBSTEPS - taken, min(followed(swallowed, left), most))
-        return min(followed(highest, left), most)
+        if not self._layers.recovers:
+            return min(followed(max(frequency2.max(initial=0.0), coming.highest, coming.swallowed), left), most)
+        few = max(1, FEW_SUBSTEPS - taken)
+        if planned >= few:
+            return planned
+        if coming.meets:
+            return max(few, min(followed(coming.swallowed, left), most))
+        return self._masses.patch_substeps(self._contacts.overlaps, left, velocity, taken, few)
 
-    def _coming(self, duration: float, velocity: Array) -> tuple[float, float]:
-        """Return the squares of frequencies of the overlaps that come within the duration. See `coming`."""
+    def _coming(self, duration: float, velocity: Array) -> Coming:
+        """Return the overlaps that come within the duration. See `coming`."""
         ahead = self._others.ahead(velocity, duration)
-        return coming(self._masses, self._frames, self._contacts.overlaps, duration, ahead, self._among)
+        found, all_frequencies = self._contacts.overlaps, not self._layers.recovers
+        return coming(self._masses, self._frames, found, duration, ahead, self._among, all_frequencies)
+
+    def _tell_of_depth(self, duration: float) -> None:
+        """Warn of bodies that are deep in each other at the end of a step of this duration (s)."""
+        depths, sizes = self._masses.dynamics.solver.depths, self._masses.sizes_of(self._contacts.overlaps)
+        self._told.of_depth(self._contacts, depths > DEEP * sizes, depths, sizes, duration)
 
     def _solve(self, duration: float, velocity: Array, frequency2: Array, whole: bool = False) -> Array:
         """Return (n, 6) force and torque on the links, in a substep of this duration or in a `whole` step."""
         other = self._others.learnt(velocity)
-        damped = (frequency2 * duration**2 > COARSE**2) & (not self._layers.recovers)
-        if damped.any():
+        damped = None if self._layers.recovers else frequency2 * duration**2 > COARSE**2
+        if damped is not None and damped.any():
             planned = 1 if whole else self._planned or MOST_SUBSTEPS
             self._told.of_substeps(self._contacts, damped, frequency2, duration, planned)
         wrenches: Array
@@ -494,16 +515,7 @@ class VolumetricContact:
             self._contacts, force, torque, slip, normal, directed, self._stiffness, self._frame, residual
         )
         self._told.of_residual(residual, self.sweeps)
-        self._told.of_depth(self._contacts, *self._deep(), duration)
         if not directed.all():
             self._told.of_direction(self._contacts, ~directed)
         self._others.solved(velocity, duration, ours)
         return wrenches
-
-    def _deep(self) -> tuple[NDArray[np.bool_], Array, Array]:
-        """Return by row: whether bodies are deep in each other, mean depths, and the sizes of the smaller bodies."""
-        found = self._contacts.overlaps
-        area = np.linalg.norm(self._masses.areas(found), axis=1)
-        sizes = self._masses.size(found)
-        deep = self._found.directed & (found.volume > DEEP * sizes * area)
-        return deep, found.volume / np.where(deep, area, 1.0), sizes

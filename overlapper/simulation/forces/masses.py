@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,25 @@ from overlapper.simulation.forces.parameter import Layers
 from overlapper.simulation.layout import FARTHEST, Pose
 from overlapper.simulation.mechanics import Mechanics
 from overlapper.simulation.model import Array
+
+# The most lists of pairs of which laws are remembered.
+REMEMBERED = 8
+
+# Patches are steady in a substep if their surfaces move over each other by less than this share of the smaller link's
+# size, and turn by less than this angle (rad).
+STEADY = 5e-3
+
+# Contacts of bodies that move by less than this (m, rad) in a step do not change. Other contacts have at least
+# so many substeps: a box that rests some nanometres deep may lose its contact, and would then fall for a whole step.
+QUIET, LEAST = 1e-11, 2
+
+
+class _Pairs(NamedTuple):
+    """The laws of pairs of shapes by name, the sizes of the smaller links, and whether a body of them has joints."""
+
+    laws: dict[str, Array]
+    sizes: Array
+    jointed: bool
 
 
 class Masses:
@@ -31,18 +52,24 @@ class Masses:
         self._links = np.array([self.dynamics.place[body, link] for body, link, _ in self.keys], dtype=np.int64)
         self._tops = bodies.tops
         self.sizes = _sizes(bodies.shapes, self._links, self._tops, len(self.dynamics.links))
+        self._smallest = self.sizes[self.sizes > 0].min(initial=np.inf)
+        self._extents = _extents(bodies.shapes, self._links, len(self.dynamics.links))
+        self._jointed = self.dynamics.jointed()
         self._batch = Batch(bodies.shapes)  # for what is not yet: the one of `bodies` knows what is
+        # By the pairs of shapes, as long as the simulator's numbers are the same.
+        self._known: dict[bytes, _Pairs] = {}
+        self._version = -1
 
     def are_stale(self) -> bool:
         return self.keys is not self._bodies.keys
 
     def stiffness(self, found: Overlaps) -> Array:
         """(p,) the stiffness of each row in Pa/m."""
-        return self._laws(found)["stiffness"]
+        return self._of(found).laws["stiffness"]
 
-    def size(self, found: Overlaps) -> Array:
-        """(p,) the size of the smaller link of each row, in m: the diameter of a ball of its volume."""
-        return np.asarray(self.sizes[self._links[found.pairs]].min(axis=1))
+    def sizes_of(self, found: Overlaps) -> Array:
+        """(p,) the size of the smaller link of each row in m: the diameter of a ball of its volume."""
+        return self._of(found).sizes
 
     def areas(self, found: Overlaps) -> Array:
         """(p, 3) the area vectors of the patches, m², from the second to the first, at the poses now.
@@ -61,16 +88,47 @@ class Masses:
             areas[rows] = seen[:, None] * normals
         return areas
 
+    def patch_substeps(self, found: Overlaps, duration: float, velocity: Array, taken: int, most: int) -> int:
+        """Return the number of substeps of a duration (s) in which the patches of the placed overlaps move little.
+
+        `taken` substeps of the step are over. The number is `most` at most, and always if a body with joints touches
+        another one: motors follow their commands in another way in longer substeps.
+        """
+        of = self._of(found)
+        if of.jointed:
+            return most
+        if not len(found) or np.abs(velocity).max(initial=0.0) * duration < QUIET:
+            return 1
+        travel, _ = self.dynamics.solver.travel(duration, velocity)
+        share = np.maximum(travel[:, 0] / of.sizes, travel[:, 1]) / STEADY
+        return min(max(1, LEAST - taken, math.ceil(float(share.max(initial=0.0)))), most)
+
+    def moves_far(self, duration: float, velocity: Array) -> bool:
+        """Whether a link moves by more than `STEADY` of the size of the smallest link within a duration (s)."""
+        _, travel = self.dynamics.solver.travel(duration, velocity)
+        way = travel[:, 0] + self._extents * travel[:, 1]
+        return bool(way.max(initial=0.0) > STEADY * self._smallest)
+
     def place(self, solver: ContactSolver, frames: Sequence[Pose], found: Overlaps) -> tuple[Array, Array]:
         """Give a solver the overlaps of links that have these frames.
 
         Returns by row the squares of frequencies (rad²/s²) and the stiffness (Pa/m).
         """
-        laws = self._laws(found)
+        laws = self._of(found).laws
         return solver.place(frames, found, self._links, **laws, tops=self._tops), laws["stiffness"]
 
-    def _laws(self, found: Overlaps) -> dict[str, Array]:
-        return self._layers.of(self._links[found.pairs], self.dynamics, self.sizes)
+    def _of(self, found: Overlaps) -> _Pairs:
+        if self._version != self.dynamics.version or len(self._known) > REMEMBERED:
+            self._known, self._version = {}, self.dynamics.version
+        key = found.pairs.tobytes()
+        if key not in self._known:
+            links = self._links[found.pairs]
+            self._known[key] = _Pairs(
+                self._layers.of(links, self.dynamics, self.sizes),
+                np.asarray(self.sizes[links].min(axis=1)),
+                bool(self._jointed[links].any()),
+            )
+        return self._known[key]
 
     def velocity(self) -> tuple[Array, set[int]]:
         """Return the velocities of all coordinates and the bodies that are lost.
@@ -78,6 +136,8 @@ class Masses:
         Velocities that are not finite are 0. The lost bodies are those that such velocities move.
         """
         velocity = self.dynamics.velocity()
+        if np.abs(velocity).max(initial=0.0) < FARTHEST:
+            return velocity, set()
         finite = np.abs(velocity) < FARTHEST
         if finite.all():
             return velocity, set()
@@ -107,3 +167,11 @@ def _sizes(shapes: Sequence[Shape], links: NDArray[np.int64], tops: Array | None
     found = np.zeros(count)
     np.add.at(found, links, volumes)
     return np.asarray(np.cbrt(6 / np.pi * found))
+
+
+def _extents(shapes: Sequence[Shape], links: NDArray[np.int64], count: int) -> Array:
+    """(count,) the lengths of the diagonals of the largest boxes around the links' shapes in m, 0 without a bound."""
+    found = np.zeros(count)
+    diagonals = np.linalg.norm([np.ptp(shape.bounds, axis=0) for shape in shapes] or np.empty((0, 3)), axis=1)
+    np.maximum.at(found, links, np.where(np.isfinite(diagonals), diagonals, 0.0))
+    return found

@@ -64,6 +64,8 @@ class Told:
 
         `duration` (s) is that of the substep.
         """
+        if not self._deep and not deep.any():
+            return
         keys = [tuple(contacts.keys[row].tolist()) for row in np.flatnonzero(deep).tolist()]
         self._deep = {key: self._deep.get(key, 0.0) + duration for key in keys}
         stays = deep.copy()

@@ -65,12 +65,14 @@ class MujocoDynamics:
         self._units = np.zeros((width, model.nv))  # row k has 1 at the k-th coordinate of each tree
         for tree in self._trees:
             self._units[range(tree.stop - tree.start), range(tree.start, tree.stop)] = 1
+        self.version = 0
         self._later = mujoco.MjData(model)
         self._roots = model.body_rootid[model.dof_bodyid]
         # Without contacts, at the last `frames`.
         self.acceleration: Array = np.zeros(model.nv + len(self._still))
 
     def read(self) -> bool:
+        self.version += 1  # the model is not compared
         return False  # `frames` reads all masses anyway
 
     def friction(self, pairs: NDArray[np.int64]) -> Array:
@@ -87,6 +89,13 @@ class MujocoDynamics:
         masses = np.bincount(trees + 1, model.body_mass, model.ntree + 1)
         masses[0] = 0  # of bodies that do not move
         return np.asarray((np.linalg.norm(model.opt.gravity) or G) * masses[trees[self._bodies] + 1])
+
+    def jointed(self) -> NDArray[np.bool_]:
+        """(n,) whether the kinematic trees of the links are more than a free body."""
+        model = self._model
+        trees = model.body_treeid[self._bodies]
+        coordinates = np.append(model.tree_dofnum, COORDINATES)  # the last one is for bodies that do not move
+        return np.asarray(coordinates[trees] != COORDINATES)
 
     def other_forces(self) -> KnownForces:
         return KnownForces(self)

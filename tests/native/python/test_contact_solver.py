@@ -37,6 +37,28 @@ def placed(depth, dissipation=0.0, friction=0.0, solver=None, **laws):
     return solver, solver.place(frames, found, links, [STIFFNESS], [dissipation], [friction], **laws)
 
 
+def test_depths_are_volumes_over_areas_and_0_without_a_patch():
+    assert placed(1e-4)[0].depths == pytest.approx([1e-4], rel=1e-9)
+    assert placed(-1e-3)[0].depths.tolist() == [0]
+    assert placed(3 * HALF)[0].depths.tolist() == [0]
+
+
+@pytest.mark.parametrize("solver", [solver_of(HELD, FREE), None])
+def test_travel_is_that_of_surfaces_at_a_patch_and_of_centres_of_links(solver):
+    """A cube moves by (3, 4, 12) mm/s and turns by (0, 0, 2) rad/s, or by (0, 0.5, 0) rad/s about its centre."""
+    depth, h = 1e-9, 0.01
+    solver, _ = placed(depth, solver=solver or cube_as_a_tree())
+    still = np.zeros(solver.coordinates - 6)
+    patches, links = solver.travel(h, [*still, 3e-3, 4e-3, 12e-3, 0, 0, 2])
+    assert patches == pytest.approx(np.array([[13e-3 * h, 2 * h]]), rel=1e-6)
+    assert links == pytest.approx(np.array([[0, 0], [13e-3 * h, 2 * h]]), rel=1e-9)
+    patches, links = solver.travel(h, [*still, 0, 0, 0, 0, 0.5, 0])
+    assert patches == pytest.approx(np.array([[0.5 * h * HALF, 0.5 * h]]), rel=1e-6)
+    assert links == pytest.approx(np.array([[0, 0], [0, 0.5 * h]]), abs=1e-10)
+    with pytest.raises(ValueError, match=r"^velocity must have \d+ numbers, not 1$"):
+        solver.travel(h, [0])
+
+
 @pytest.mark.parametrize("recovery", [0.0, 0.02])
 @pytest.mark.parametrize("dissipation", [0.0, 2e-3])
 @pytest.mark.parametrize("damped", [False, True])
