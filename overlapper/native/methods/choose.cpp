@@ -488,20 +488,23 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
   const Choice& choice = choose(traits(overlapping.bodies));
   const double finest = std::max(overlapping.tolerance, kFinest);
   MeasuresAndInertia kept;
+  const auto error = [&](const auto& found) { return error_of(found->measures) / found->measures.volume; };
   auto formula = choice.tries(Way::kClosedForm) && !in_doubt ? by_formula(overlapping, finest) : std::nullopt;
-  if (choice.tries(Way::kSlicing) &&
-      !(formula && error_of(formula->measures) <= kEnoughOfRound * formula->measures.volume)) {
-    if (const auto& sliced = overlapping.sliced()) return *sliced;
+  if (choice.tries(Way::kSlicing) && !(formula && error(formula) <= kEnoughOfRound)) {
+    const auto& sliced = overlapping.sliced();
+    if (sliced && error(sliced) <= kEnoughOfRound) return *sliced;
+    if (in_doubt && choice.tries(Way::kClosedForm)) formula = by_formula(overlapping, finest);
     // If slices give up, features lie so near each other that a closed form may confuse them, too.
-    if (formula && !(error_of(formula->measures) <= kSureOfFormula * formula->measures.volume)) formula.reset();
+    if (formula && !(error(formula) <= kSureOfFormula)) formula.reset();
+    if (sliced && !(formula && error(formula) < error(sliced))) return *sliced;
   }
+  if (formula) return *std::move(formula);
   if (in_doubt) {
     kept = by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);
     bound_by_ball(overlapping, kept.measures);
     return kept;
   }
-  if (formula) kept = std::move(*formula);
-  else kept = by_region(overlapping.region(), overlapping.bodies, overlapping.traced ? Way::kTracing : Way::kDual);
+  kept = by_region(overlapping.region(), overlapping.bodies, overlapping.traced ? Way::kTracing : Way::kDual);
   const auto keep_better = [&](const Region& region) {
     MeasuresAndInertia again = by_region(region, overlapping.bodies, Way::kWideDual);
     if (!widened(kept.measures.way) || error_of(again.measures) < error_of(kept.measures)) kept = std::move(again);

@@ -312,13 +312,23 @@ class Bundle {
       angle[k] = half_turn_angle(h / whole, d / whole);
     }
     for (int k = 0; k < kRow; ++k) shortest = std::min(shortest, length[k] - kShort * radius[k]);
-    // If a chord is only rounding, the direction across it is the direction from the centre.
+    // If a chord is only rounding, the direction across it is the direction from the centre. One of its coordinates,
+    // the one with less rounding, then tells its length.
     for (int k = 0; shortest < 0 && k < kRow; ++k) {
       if (!(length[k] < kShort * radius[k])) continue;
       const Point away =
           Point{0.5 * (p.x[k] + q.x[k]) - sides_.centre_x[k], 0.5 * (p.y[k] + q.y[k]) - sides_.centre_y[k]};
       const double far = std::copysign(norm(away), distance[k]);
-      if (far != 0) ax[k] = away.x / far, ay[k] = away.y / far;
+      if (far == 0) continue;
+      const double x = away.x / far, y = away.y / far;
+      const double of_x = std::max(std::abs(p.x[k]), std::abs(q.x[k])) * std::abs(x),
+                   of_y = std::max(std::abs(p.y[k]), std::abs(q.y[k])) * std::abs(y);
+      const double l = std::abs(of_y < of_x ? (q.y[k] - p.y[k]) / x : (q.x[k] - p.x[k]) / y);
+      ax[k] = x, ay[k] = y;
+      if (!(l < 2 * length[k])) continue;
+      const double h = 0.5 * l, d = distance[k], whole = std::max(std::sqrt(h * h + d * d), DBL_MIN);
+      length[k] = l, sine[k] = h / whole, cosine[k] = d / whole;
+      angle[k] = half_turn_angle(h / whole, d / whole);
     }
   }
 
