@@ -46,3 +46,22 @@ def test_volumes_of_shallow_contacts_have_ten_digits(kind):
         assert abs(volume - upper) <= 1e-10 * float(upper), seed
         assert error <= 1e-8 * volume, (seed, found.way)
     assert ways <= {"closed form", "slicing"}
+
+
+@pytest.mark.parametrize("kind", THIN)
+def test_the_volume_is_the_same_whether_or_not_the_area_was_asked_for(kind):
+    """Slices leave out the surface of an ellipsoid until its area is asked for."""
+    sliced = 0
+    for seed in range(40):
+        a, b = contact(kind, seed)
+        found, other = overlap(a, b), overlap(a, b)
+        if not found or found.way != "slicing":
+            continue
+        sliced += 1
+        volume = found.volume
+        area = other.area
+        assert found.area == area and other.volume == volume
+        # A convex set has no more surface than a box around it.
+        low, high = found.bounds
+        assert 0 < area <= sum(2 * np.prod(np.delete(high - low, axis)) for axis in range(3)) * (1 + 1e-9)
+    assert sliced

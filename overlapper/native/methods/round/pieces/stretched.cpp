@@ -99,7 +99,7 @@ BallSums best_of_ball(std::span<Round> rounds, std::vector<Wall>& walls, const S
                       const Mat3& turn, const quadric::Stretch& stretch) {
   BallSums best;
   PieceSetting setting;
-  setting.stretch = &stretch;
+  setting.stretch = &stretch, setting.areas = pair.with_area;
   for (int attempt = 0; attempt < 2 && !(best.error <= kMostOpen * best.sums.totals.volume); ++attempt) {
     const Vec3 step = attempt > 0 ? best.sums.totals.first / best.sums.totals.volume : Vec3{};
     if (!(norm(step) <= 2)) break;
@@ -179,6 +179,8 @@ std::optional<RoundMeasures> measure_stretched(const SlicedPair& pair) {
   RoundMeasures result =
       in_world({best.sums.totals, best.error, of_flat.misplaced() + of_ellipsoid.rounding, {}, best.moved}, pair,
                ellipsoid, stretch, swapped);
+  // Until the area is asked for, it is an upper bound.
+  result.area_known = pair.with_area;
   result.facets_touched = static_cast<int>(of_flat.walls.size());
   return result;
 }

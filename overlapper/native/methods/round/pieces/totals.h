@@ -104,6 +104,7 @@ struct PieceSetting {
   const quadric::Stretch* stretch = nullptr;  ///< for an ellipsoid: maps the ball and its planes to the world
   const EnclosingPolytope* common = nullptr;  ///< no piece lies outside of it
   PatchView view;                             ///< of the patch, if one is summed
+  bool areas = true;                          ///< wanted; otherwise, those of an ellipsoid may be bounds
   bool closely = false;                       ///< sample all of every interval
   bool many_walls = false;                    ///< the same for two or more rounds: many planes meet their corners
   double sure = kSure;                        ///< negligible rounding of a polytope's corners, relative to the volume

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "geometry/moments.h"
 
@@ -45,6 +47,11 @@ struct Stretch {
   /// The surface between two parallel planes, per height of the strip, along the arc level + cos φ across + sin φ along
   /// of the unit ball, |φ| <= half_angle.
   double arc(Vec3 level, Vec3 across, Vec3 along, double half_angle) const;
+  /// An upper bound of the same.
+  double most_of_arc(Vec3 level, Vec3 across, Vec3 along, double half_angle) const {
+    const double farthest = std::sin(std::min(half_angle, std::numbers::pi / 2));
+    return 2 * half_angle * (area(level + across) + (1 - std::cos(half_angle)) * area(across) + farthest * area(along));
+  }
 
   /// The image of the moments of a part of the ball.
   Moments moments(const Moments& of_ball) const {

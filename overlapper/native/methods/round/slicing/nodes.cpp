@@ -402,7 +402,8 @@ class Bundle {
       const Vec3 level = (t_[k] - stack_.quadric[stack_.ball].level) * stack_.n;
       const Vec3 across = radius[k] * (x[k] * stack_.l + y[k] * stack_.m),
                  along = radius[k] * (x[k] * stack_.m - y[k] * stack_.l);
-      const double strip = stack_.stretch->arc(level, across, along, angle[k]);
+      const double strip = stack_.areas ? stack_.stretch->arc(level, across, along, angle[k])
+                                        : stack_.stretch->most_of_arc(level, across, along, angle[k]);
       surface_[k] += strip, surface += counts_[k] * strip;
     }
     return surface;

@@ -110,7 +110,7 @@ class Integrating {
     };
     const double volume = of(part.volume, part.integrals.volume, volume_, kVolumeError, kVolumeTail);
     if (stack_.stretch) {
-      if (sum_.rules > kMostRulesForStretch) return volume;
+      if (!stack_.areas || sum_.rules > kMostRulesForStretch) return volume;
       // If terms fall slowly, more nodes help little.
       if (part.area.stretched_error(part.integrals.area) > kStretchedAreaError * area_) return kHopeless;
     }

@@ -129,6 +129,7 @@ struct Stack {
   Point shear;                                ///< components of t along l and m
   std::optional<View> view;                   ///< set if a surface is viewed
   const quadric::Stretch* stretch = nullptr;  ///< for an ellipsoid: maps the ball and all else to the world
+  bool areas = true;                          ///< wanted; otherwise, those of an ellipsoid are bounds
 
   /// The stretched area of a part of a plane with the area vector `normal` along l, m and n.
   double area(Vec3 normal) const { return stretch->area(normal.x * l + normal.y * m + normal.z * n); }
