@@ -728,14 +728,14 @@ class Overlap:
         """
         (6 m, 6 m) second derivatives of the volume by the numbers of `gradient`, in its order: a translation, and a rotation
         vector about the body's own position, of each body. The matrix is symmetric. The volume after a small motion x of all bodies is
-        volume + gradient.ravel() @ x + x @ hessian @ x / 2. NaN where a face of one body lies in the plane of a face of another body:
-        there the volume has a kink. Where an edge lies in the plane of a face, it is one of two one-sided values. m, m² and m³; zeros
-        unless overlapping.
+        volume + gradient.ravel() @ x + x @ hessian @ x / 2. NaN where a face of one body lies in the plane of a face of another body,
+        where round surfaces coincide, and where surfaces touch along a line. Where surfaces touch at a point, or an edge lies in the
+        plane of a face, it is one of two one-sided values. m, m² and m³; zeros unless overlapping.
 
         Raises
         ------
         ValueError
-            If a body is round.
+            If there are three or more bodies, and one of them is round.
         """
 
     @property
@@ -1093,8 +1093,8 @@ class Overlaps:
     @property
     def hessian(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (p, 12, 12) second derivatives of the volume by the twelve numbers of `gradient`, as Overlap.hessian; NaN for pairs
-        with a round body, zeros unless overlapping. The first use takes some tens of microseconds for each pair.
+        (p, 12, 12) second derivatives of the volume by the twelve numbers of `gradient`, as Overlap.hessian; zeros
+        unless overlapping. The first use takes some tens of microseconds for each pair of polyhedra, and longer for round bodies.
         """
 
     @property

@@ -31,6 +31,7 @@ ROUND = {
     "closed_forms": ["closed_forms", "quadric"],
     "lenses": ["lenses", "pieces", "slicing", "quadric"],
     "pieces": ["pieces", "slicing", "quadric"],
+    "seam": ["seam", "lenses", "pieces", "slicing", "quadric"],
     "slicing": ["slicing", "quadric"],
     "quadric": ["quadric"],
 }

@@ -45,12 +45,16 @@ class PairOfKinds:
         self.poses = [(0.25 * rng.normal(size=3), rng.normal(size=4)) for _ in kinds]
         self.numbers = [np.r_[KINDS[kind][1], np.zeros(6)] for kind in kinds]
 
-    def overlap(self, numbers):
+    def bodies(self, numbers=None):
+        """The placed shapes; without motion if no numbers are given."""
         bodies = []
-        for kind, (position, turn), row in zip(self.kinds, self.poses, numbers):
+        for kind, (position, turn), row in zip(self.kinds, self.poses, self.numbers if numbers is None else numbers):
             turned = Rotation.from_rotvec(row[-3:]) * Rotation.from_quat(turn)
             bodies.append(Placed(KINDS[kind][0](*row[:-6]), position + row[-6:-3], turned.as_quat()))
-        return overlap(*bodies, tolerance=1e-9)
+        return bodies
+
+    def overlap(self, numbers):
+        return overlap(*self.bodies(numbers), tolerance=1e-9)
 
     def gradient(self):
         """The derivatives by the numbers of each body, without motion."""

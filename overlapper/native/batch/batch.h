@@ -79,7 +79,7 @@ struct Overlaps {
   const Patches& patches() const;
   const std::vector<ShapeGradients>& shape_gradients() const;
   const DepthGradients& depth_gradients() const;
-  const std::vector<PoseHessian>& hessians() const;  ///< NaN for pairs with a round body
+  const std::vector<PoseHessian>& hessians() const;
   /// The patch of a row. It is seen along a unit direction if one is given.
   Patch patch(size_t row, const std::optional<Vec3>& direction = {}) const;
 

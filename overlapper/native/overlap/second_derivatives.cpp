@@ -7,6 +7,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/ridges.h"
+#include "methods/round/seam/seam.h"
 #include "overlap/shape_gradient.h"
 
 namespace overlapper {
@@ -30,14 +31,70 @@ struct MovingFacet {
   }
 };
 
-class SecondDerivatives {
+/// Sums over a seam. Places are about an origin, and `levers` lead to it from the position of each body.
+class SumsOverSeam {
  public:
-  explicit SecondDerivatives(const Overlap& overlap)
-      : bodies_(overlap.bodies()),
-        region_(overlap.drawn()),
-        width_(kNumbersOfBody * bodies_.size()),
-        sums_(width_ * width_, 0) {
-    for (const Placed& body : bodies_) levers_.push_back(region_.reference - body.position + region_.frame.origin);
+  /// The origin is at `place` about `reference`.
+  SumsOverSeam(std::span<const Placed> bodies, Vec3 reference, Vec3 place)
+      : bodies_(bodies), width_(kNumbersOfBody * bodies.size()), sums_(width_ * width_, 0) {
+    for (const Placed& body : bodies) levers_.push_back(reference - body.position + place);
+  }
+
+  void add_at_seam(const MovingFacet& one, const MovingFacet& two, Vec3 x, double cosine, double weight) {
+    const size_t a = one.owner, b = two.owner;
+    const Speeds p = one.speeds(levers_[a] + x), q = two.speeds(levers_[b] + x);
+    for (int k = 0; k < kNumbersOfBody; ++k)
+      for (int l = 0; l < kNumbersOfBody; ++l) add_pair(a, k, b, l, weight * p[k] * q[l]);
+    add_own(a, p, two.speeds(levers_[a] + x), cosine, weight);
+    add_own(b, q, one.speeds(levers_[b] + x), cosine, weight);
+  }
+
+  /// The derivatives by two numbers of one body, at its seam with a facet that stays. `against` are the speeds of that
+  /// facet if it moves along.
+  void add_own(size_t body, const Speeds& own, const Speeds& against, double cosine, double weight) {
+    for (int k = 0; k < kPose; ++k)
+      for (int l = 0; l < kPose; ++l) add_pair(body, k, body, l, -weight / 2 * own[k] * against[l]);
+    for (int k = kPose; k < kNumbersOfBody; ++k) {
+      for (int l = 0; l < kPose; ++l) add_pair(body, k, body, l, -weight * cosine * own[k] * own[l]);
+      for (int l = kPose; l < kNumbersOfBody; ++l) at(body, k, body, l) -= weight * cosine * own[k] * own[l];
+    }
+  }
+
+  /// Adds what the turning of the area vectors adds.
+  void add_turning(std::span<const std::array<double, 6>> gradient) {
+    for (size_t i = 0; i < bodies_.size(); ++i) {
+      const auto& row = gradient[i];
+      const Vec3 force{row[0], row[1], row[2]};
+      // dot(t, cross(r, F)), half of it on either side of the diagonal.
+      for (int k = 0; k < 3; ++k) {
+        const int after = (k + 1) % 3, before = (k + 2) % 3;
+        add_pair(i, k, i, 3 + after, force[before] / 2);
+        add_pair(i, k, i, 3 + before, -force[after] / 2);
+      }
+    }
+  }
+
+  std::vector<double> take() { return std::move(sums_); }
+
+ protected:
+  double& at(size_t body, int k, size_t other, int l) {
+    return sums_[(kNumbersOfBody * body + k) * width_ + kNumbersOfBody * other + l];
+  }
+  void add_pair(size_t body, int k, size_t other, int l, double value) {
+    at(body, k, other, l) += value, at(other, l, body, k) += value;
+  }
+
+  std::span<const Placed> bodies_;
+  size_t width_;
+  std::vector<double> sums_;
+  std::vector<Vec3> levers_;
+};
+
+class SumsOverPolytope : public SumsOverSeam {
+ public:
+  explicit SumsOverPolytope(const Overlap& overlap)
+      : SumsOverSeam(overlap.bodies(), overlap.drawn().reference, overlap.drawn().frame.origin),
+        region_(overlap.drawn()) {
     for (const Region::Facet& facet : region_.facets) {
       const Shape& shape = bodies_[facet.owner].shape;
       Vec3 size;
@@ -62,17 +119,8 @@ class SecondDerivatives {
         if (f < other) add_edge(facets_[f], facets_[other], corners_[from], corners_[to]);
       }
     }
-    for (size_t i = 0; i < bodies_.size(); ++i) {
-      const auto& row = gradient[i];
-      const Vec3 force{row[0], row[1], row[2]};
-      // dot(t, cross(r, F)), half of it on either side of the diagonal.
-      for (int k = 0; k < 3; ++k) {
-        const int after = (k + 1) % 3, before = (k + 2) % 3;
-        add_pair(i, k, i, 3 + after, force[before] / 2);
-        add_pair(i, k, i, 3 + before, -force[after] / 2);
-      }
-    }
-    return std::move(sums_);
+    add_turning(gradient);
+    return take();
   }
 
  private:
@@ -103,13 +151,6 @@ class SecondDerivatives {
     return false;
   }
 
-  double& at(size_t body, int k, size_t other, int l) {
-    return sums_[(kNumbersOfBody * body + k) * width_ + kNumbersOfBody * other + l];
-  }
-  void add_pair(size_t body, int k, size_t other, int l, double value) {
-    at(body, k, other, l) += value, at(other, l, body, k) += value;
-  }
-
   /// Adds the edge between two facets by Gauss's two nodes, which are exact for products of two linear functions.
   void add_edge(const MovingFacet& one, const MovingFacet& two, Vec3 from, Vec3 to) {
     const double sine = norm(cross(one.normal, two.normal)), cosine = dot(one.normal, two.normal);
@@ -126,26 +167,6 @@ class SecondDerivatives {
     }
   }
 
-  void add_at_seam(const MovingFacet& one, const MovingFacet& two, Vec3 x, double cosine, double weight) {
-    const size_t a = one.owner, b = two.owner;
-    const Speeds p = one.speeds(levers_[a] + x), q = two.speeds(levers_[b] + x);
-    for (int k = 0; k < kNumbersOfBody; ++k)
-      for (int l = 0; l < kNumbersOfBody; ++l) add_pair(a, k, b, l, weight * p[k] * q[l]);
-    add_own(a, p, two.speeds(levers_[a] + x), cosine, weight);
-    add_own(b, q, one.speeds(levers_[b] + x), cosine, weight);
-  }
-
-  /// The derivatives by two numbers of one body, at its seam with a facet that stays. `against` are the speeds of that
-  /// facet if it moves along.
-  void add_own(size_t body, const Speeds& own, const Speeds& against, double cosine, double weight) {
-    for (int k = 0; k < kPose; ++k)
-      for (int l = 0; l < kPose; ++l) add_pair(body, k, body, l, -weight / 2 * own[k] * against[l]);
-    for (int k = kPose; k < kNumbersOfBody; ++k) {
-      for (int l = 0; l < kPose; ++l) add_pair(body, k, body, l, -weight * cosine * own[k] * own[l]);
-      for (int l = kPose; l < kNumbersOfBody; ++l) at(body, k, body, l) -= weight * cosine * own[k] * own[l];
-    }
-  }
-
   void add_at_edge_of_box(const MovingFacet& one, const MovingFacet& two, Vec3 x, double weight) {
     const size_t body = one.owner;
     const Speeds p = one.speeds(levers_[body] + x), q = two.speeds(levers_[body] + x);
@@ -155,22 +176,37 @@ class SecondDerivatives {
     }
   }
 
-  std::span<const Placed> bodies_;
   const Region& region_;
-  size_t width_;
-  std::vector<double> sums_;
-  std::vector<Vec3> levers_;  ///< from each body's position to the frame's origin
   std::vector<MovingFacet> facets_;
   std::vector<Vec3> corners_;  ///< about the frame's origin
 };
+
+/// NaN for the numbers of shapes.
+std::vector<double> of_round_pair(const Overlap& overlap) {
+  constexpr size_t kWidth = 2 * kNumbersOfBody;
+  std::vector<double> none(kWidth * kWidth, kNoDerivative);
+  const std::span<const Placed> bodies = overlap.bodies();
+  const Vec3 inside = overlap.centroid();
+  const auto points = seam::seam_of(bodies[0], bodies[1], inside);
+  if (!points) return none;
+  SumsOverSeam sums(bodies, inside, {});
+  for (const seam::SeamPoint& point : *points)
+    sums.add_at_seam({0, point.outward[0], {}}, {1, point.outward[1], {}}, point.place, 0, point.weight);
+  sums.add_turning(overlap.gradient());
+  std::vector<double> found = sums.take();
+  for (size_t k = 0; k < kWidth; ++k)
+    for (size_t l = 0; l < kWidth; ++l)
+      if (k % kNumbersOfBody >= kPose || l % kNumbersOfBody >= kPose) found[k * kWidth + l] = kNoDerivative;
+  return found;
+}
 
 }  // namespace
 
 std::vector<double> second_derivatives(const Overlap& overlap) {
   const size_t width = kNumbersOfBody * overlap.bodies().size();
-  if (!polyhedral(overlap.bodies())) return std::vector<double>(width * width, kNoDerivative);
   if (overlap.status() != Status::kOverlapping) return std::vector<double>(width * width, 0);
-  return SecondDerivatives(overlap).sums(overlap.gradient());
+  if (polyhedral(overlap.bodies())) return SumsOverPolytope(overlap).sums(overlap.gradient());
+  return overlap.pair() ? of_round_pair(overlap) : std::vector<double>(width * width, kNoDerivative);
 }
 
 std::vector<double> pose_hessian(const Overlap& overlap) {

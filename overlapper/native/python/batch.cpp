@@ -290,8 +290,8 @@ overlapping.)");
       [](const Overlaps& overlaps) -> const auto& {
         return unlocked([&]() -> const std::vector<PoseHessian>& { return overlaps.hessians(); });
       },
-      R"((p, 12, 12) second derivatives of the volume by the twelve numbers of `gradient`, as Overlap.hessian; NaN for pairs
-with a round body, zeros unless overlapping. The first use takes some tens of microseconds for each pair.)");
+      R"((p, 12, 12) second derivatives of the volume by the twelve numbers of `gradient`, as Overlap.hessian; zeros
+unless overlapping. The first use takes some tens of microseconds for each pair of polyhedra, and longer for round bodies.)");
   define_patch_column(cls, "patch_centre", &Overlaps::Patches::centre,
                       R"((p, 3) m, the centre of that area in the plane through the centroid; NaN without an area. The
 first use of the centre, the moments or the distance takes some microseconds for each pair.)");

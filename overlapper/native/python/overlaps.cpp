@@ -240,20 +240,21 @@ void define_hessian(nb::class_<Overlap>& cls) {
   array_property(
       cls, "hessian",
       [](const Overlap& o) {
-        if (!polyhedral(o.bodies())) fail("hessian", "exists for boxes, hulls and half-spaces, not for round bodies");
+        if (!o.pair() && !polyhedral(o.bodies()))
+          fail("hessian", "exists for every pair, but for three or more bodies only if none is round");
         const size_t width = 6 * o.bodies().size();
         return to_numpy<Matrix>(computed_of(o.bodies(), [&] { return pose_hessian(o); }), {width, width});
       },
       R"((6 m, 6 m) second derivatives of the volume by the numbers of `gradient`, in its order: a translation, and a rotation
 vector about the body's own position, of each body. The matrix is symmetric. The volume after a small motion x of all bodies is
-volume + gradient.ravel() @ x + x @ hessian @ x / 2. NaN where a face of one body lies in the plane of a face of another body:
-there the volume has a kink. Where an edge lies in the plane of a face, it is one of two one-sided values. m, m² and m³; zeros
-unless overlapping.
+volume + gradient.ravel() @ x + x @ hessian @ x / 2. NaN where a face of one body lies in the plane of a face of another body,
+where round surfaces coincide, and where surfaces touch along a line. Where surfaces touch at a point, or an edge lies in the
+plane of a face, it is one of two one-sided values. m, m² and m³; zeros unless overlapping.
 
 Raises
 ------
 ValueError
-    If a body is round.)");
+    If there are three or more bodies, and one of them is round.)");
 }
 
 void define_shape_gradient(nb::class_<Overlap>& cls) {

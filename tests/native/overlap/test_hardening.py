@@ -78,7 +78,7 @@ def bits(value):
 
 
 def asked(value, name):
-    """A property, or the sentence that refuses it: round bodies have no `hessian`."""
+    """A property, or the sentence that refuses it: groups with a round body have no `hessian`."""
     try:
         return getattr(value, name)
     except ValueError as refusal:

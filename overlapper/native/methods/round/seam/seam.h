@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "shapes/shape.h"
+
+namespace overlapper::seam {
+
+/// A node on the seam: the closed lines where the surfaces of both bodies cross.
+struct SeamPoint {
+  Vec3 place;                   ///< about the inner point
+  std::array<Vec3, 2> outward;  ///< normals of both surfaces, of any length
+  double weight = 0;
+  double blur = 0;  ///< relative error of the weight by rounding
+};
+
+/// Nodes of a quadrature along the seam of a pair that overlaps, at least one body of it round. Sums over the nodes of
+/// weight f(outward[0], outward[1]) are the integral of f(n, m) / sin(n, m) along the seam, for the unit normals n and
+/// m and any f that is linear in each of them. `inside` is a point of the common set.
+///
+/// Bodies are cut into pieces: parts of at most one quadric inside planes. A line where a plane or a cylinder crosses a
+/// quadric has two branches over a parameter, as the surface consists of parallel straight lines. Levin (1976) finds
+/// the crossings of quadrics in the same way. Two ellipsoids have no such surface. Their lines are followed.
+///
+/// No value if surfaces of both bodies coincide, or touch along a line.
+std::optional<std::vector<SeamPoint>> seam_of(const Placed& a, const Placed& b, Vec3 inside);
+
+}  // namespace overlapper::seam
