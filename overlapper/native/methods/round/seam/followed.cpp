@@ -44,7 +44,9 @@ class Followed {
   /// minimum from a maximum. Great circles from each of them to the next one therefore meet every line.
   void find_starts() {
     const Mat3 k = two_.k * one_.stretch;
-    const auto [value, axes] = symmetric_axes(k);
+    const auto found = symmetric_axes(k);
+    const std::array<double, 3>& value = found.first;
+    const std::array<Vec3, 3>& axes = found.second;
     OnUnitBall on;
     const Vec3 gradient = two_.gradient(one_.centre);
     on.constant = two_.value(one_.centre);
