@@ -116,6 +116,7 @@ struct CylinderSums {
   double upward = 0;               ///< m²: area of faces that look up, seen along the axis
   double far2 = 0;                 ///< m²: largest squared distance of a cut edge's corner from the origin
   double turned = 0;               ///< rad: sum over the arcs
+  double rims = 0;                 ///< m: bound of the length of all arcs
   double levels = 0, squares = 0;  ///< ∫ z dθ and ∫ z² dθ along the arcs
   Vec3 height_moments;             ///< Σ h ∫ x dA
   double radial = 0;               ///< Σ ∫ (ρ² − r²) (n_x x + n_y y) dA
@@ -271,7 +272,7 @@ void add_arc(Vec3 n, Vec3 p, Vec3 q, double angle, double radius, CylinderSums& 
   const double s = std::sin(x), c = std::cos(x);
   const Arc of = arc(x, s, c);
   ++sums.terms;
-  sums.turned += angle;
+  sums.turned += angle, sums.rims += radius * std::abs(angle) + std::abs(rise);
   sums.sizes += radius * radius * std::abs(mean * angle);
   sums.levels += mean * angle;
   sums.squares += mean * mean * angle;
@@ -358,8 +359,8 @@ bool finish(const AboutAxis& at, CylinderSums& sums) {
   if (!(part.volume <= (1 + kUnbalanced) * kPi * r * r * at.height)) return false;
   part.area += curved, part.whole_area = sums.all_area + curved;
   const double reach = std::sqrt(sums.far2) + r;
-  part.error =
-      kUnit * (kMostRoundings + sums.terms) * sums.sizes / 3 + kLeaving * reach * (sums.all_area + std::abs(curved));
+  part.error = kUnit * (kMostRoundings + sums.terms) * sums.sizes / 3 +
+               kLeaving * reach * (sums.all_area + std::abs(curved) + reach * sums.rims / 3);
   const Vec3 of_curved{r * part.curved.force.x, r * part.curved.force.y, r * sums.squares / 2};
   part.first = 0.25 * (sums.height_moments + r * of_curved);
   const double v = part.volume, both = sums.radial / 4 + r * r * v / 2, rest = (r * r * v - both) / 2;
@@ -402,7 +403,9 @@ struct CylinderScratch {
 // forth as much as back, and faces look up as much as down. An arc in the wrong direction would violate both.
 //
 // Error. Every term has at most kMostRoundings roundings, and every sum adds one. Points are off by kLeaving times the
-// reach of their numbers. The volume between the computed surface and the true one is at most that, times the area.
+// reach of their numbers. The volume between the computed surface and the true one is at most that, times the area. A
+// point off the cylinder also leaves a gap along its arc, between the face and the curved part. The gap is at most as
+// wide as the point is off, and counts with a third of the reach as its height.
 std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius) {
   const Scratch<CylinderScratch> scratch;
   auto& [at, chords, sections] = *scratch;
