@@ -81,6 +81,7 @@ def step_figures(name: str, model: mujoco.MjModel) -> dict[str, float]:
         watch("mj_step", mujoco.mj_step, model, data)
         watch("update", bodies.update)
         contacts = watch("overlaps", bodies.overlaps)
+        bodies.update()
         watch("again", bodies.update)
         us.append(watch.take())
     check(name, contacts.overlaps, bodies)
