@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cfloat>
-#include <utility>
 
 #include "geometry/constants.h"
+#include "geometry/fitted_axes.h"
 
 namespace overlapper::lenses {
 namespace {
@@ -35,42 +35,6 @@ WideMatrix between_balls(const StretchedBall& first, const StretchedBall& second
     return scaled(scaled_by(turned, first.half_axes), scale);
   };
   return {row(0), row(1), row(2)};
-}
-
-struct Principal {
-  std::array<double, 3> value;  ///< in ascending order
-  std::array<Vec3, 3> axis;
-};
-
-/// The principal values and axes of KᵀK, by Jacobi's rotations of the columns of K.
-Principal principal(const Mat3& k) {
-  std::array<Vec3, 3> column{Vec3{k.row0.x, k.row1.x, k.row2.x}, Vec3{k.row0.y, k.row1.y, k.row2.y},
-                             Vec3{k.row0.z, k.row1.z, k.row2.z}};
-  std::array<Vec3, 3> axis{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
-  constexpr int kMostSweeps = 12;
-  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
-    bool turned = false;
-    for (const auto& [p, q] : {std::pair{0, 1}, {0, 2}, {1, 2}}) {
-      const double both = overlapper::dot(column[p], column[q]), of_p = norm2(column[p]), of_q = norm2(column[q]);
-      if (!(std::abs(both) > 0x1p-52 * std::sqrt(of_p * of_q))) continue;
-      // The column along the axis of an endless cylinder is only rounding.
-      if (std::min(of_p, of_q) < 0x1p-100 * std::max(of_p, of_q)) continue;
-      turned = true;
-      const double half = (of_q - of_p) / (2 * both);
-      const double tangent = std::copysign(1 / (std::abs(half) + std::sqrt(half * half + 1)), half);
-      const double cosine = 1 / std::sqrt(tangent * tangent + 1), sine = tangent * cosine;
-      for (auto* vectors : {&column, &axis}) {
-        const Vec3 before = (*vectors)[p];
-        (*vectors)[p] = cosine * before - sine * (*vectors)[q];
-        (*vectors)[q] = sine * before + cosine * (*vectors)[q];
-      }
-    }
-    if (!turned) break;
-  }
-  std::array<int, 3> order{0, 1, 2};
-  const std::array<double, 3> value{norm2(column[0]), norm2(column[1]), norm2(column[2])};
-  std::ranges::sort(order, {}, [&](int i) { return value[i]; });
-  return {{value[order[0]], value[order[1]], value[order[2]]}, {axis[order[0]], axis[order[1]], axis[order[2]]}};
 }
 
 /// The direction of a rim. If a face is much nearer to the inner point than a shallow part of the first body is wide,

@@ -4,6 +4,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/constants.h"
+#include "geometry/fitted_axes.h"
 #include "methods/round/lenses/polynomials.h"
 #include "methods/round/seam/part.h"
 
@@ -43,17 +44,14 @@ class Followed {
   /// On the first body, the value of the second has at most two minima and two maxima. A line of the seam separates a
   /// minimum from a maximum. Great circles from each of them to the next one therefore meet every line.
   void find_starts() {
-    const Mat3 k = two_.k * one_.stretch;
-    const auto found = symmetric_axes(k);
-    const std::array<double, 3>& value = found.first;
-    const std::array<Vec3, 3>& axes = found.second;
+    const Principal of = principal(two_.k * one_.stretch);
     OnUnitBall on;
     const Vec3 gradient = two_.gradient(one_.centre);
     on.constant = two_.value(one_.centre);
-    for (int i = 0; i < 3; ++i) on.value[i] = value[i], on.slope[i] = dot(gradient, one_.stretch * axes[i]);
+    for (int i = 0; i < 3; ++i) on.value[i] = of.value[i], on.slope[i] = dot(gradient, one_.stretch * of.axis[i]);
     find_extremes(on);
     const auto place = [&](Vec3 y) {
-      return one_.centre + one_.stretch * (y.x * axes[0] + y.y * axes[1] + y.z * axes[2]);
+      return one_.centre + one_.stretch * (y.x * of.axis[0] + y.y * of.axis[1] + y.z * of.axis[2]);
     };
     for (size_t i = 0; i + 1 < extremes_.size(); ++i) {
       const Vec3 p = extremes_[i], next = extremes_[i + 1], beside = next - dot(next, p) * p;
@@ -79,25 +77,6 @@ class Followed {
       sum[4] += v * a * a - s * a;
     }
     return sum;
-  }
-
-  /// Squares of the principal stretches of a matrix, and the axes, by Jacobi's rotations of its columns.
-  static std::pair<std::array<double, 3>, std::array<Vec3, 3>> symmetric_axes(const Mat3& k) {
-    std::array<Vec3, 3> axes{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
-    constexpr int kSweeps = 12;
-    for (int sweep = 0; sweep < kSweeps; ++sweep)
-      for (const auto& [p, q] : {std::pair{0, 1}, {0, 2}, {1, 2}}) {
-        const Vec3 of_p = k * axes[p], of_q = k * axes[q];
-        const double both = dot(of_p, of_q);
-        if (both == 0) continue;
-        const double half = (norm2(of_q) - norm2(of_p)) / (2 * both);
-        const double tangent = std::copysign(1 / (std::abs(half) + std::hypot(half, 1)), half);
-        const double cosine = 1 / std::hypot(tangent, 1), sine = tangent * cosine;
-        const Vec3 before = axes[p];
-        axes[p] = cosine * before - sine * axes[q], axes[q] = sine * before + cosine * axes[q];
-      }
-    std::ranges::sort(axes, {}, [&](Vec3 axis) { return norm2(k * axis); });
-    return {{norm2(k * axes[0]), norm2(k * axes[1]), norm2(k * axes[2])}, axes};
   }
 
   /// Where the gradient is along the normal: (value − λ) y = −slope. The lengths of y are 1 for at most six λ. Without
@@ -187,6 +166,8 @@ class Followed {
     const Vec3 bend = (-norm2(one_.k * t) * cross(m, t) - norm2(two_.k * t) * cross(t, n)) / det;
     return {x, t, bend, std::min(0.5 / norm(bend), part_.extent)};
   }
+
+  /// The place on both surfaces at a distance along a step. False if Newton's method leaves the line.
   bool place(const Step& step, double along, Vec3& x) const {
     const Vec3 guess = step.from + along * step.tangent + along * along / 2 * step.bend;
     x = guess;
