@@ -19,11 +19,11 @@ from overlapper.simulation.layout import FARTHEST, Pose
 from overlapper.simulation.mechanics import Mechanics
 from overlapper.simulation.model import Array
 
-# The most lists of pairs of which laws are remembered.
+# The largest number of lists of pairs whose laws are kept.
 REMEMBERED = 8
 
-# Patches are steady in a substep if their surfaces move over each other by less than this share of the smaller link's
-# size, and turn by less than this angle (rad).
+# In a substep, surfaces move over each other by at most this share of the smaller link's size. They turn by at most
+# this angle (rad).
 STEADY = 5e-3
 
 # Contacts of bodies that move by less than this (m, rad) in a step do not change. Other contacts have at least
@@ -139,8 +139,6 @@ class Masses:
         if np.abs(velocity).max(initial=0.0) < FARTHEST:
             return velocity, set()
         finite = np.abs(velocity) < FARTHEST
-        if finite.all():
-            return velocity, set()
         bodies = self._bodies
         positions, orientations = self.dynamics.solver.ahead(
             bodies.time_step, velocity, self._links, bodies.positions, bodies.orientations

@@ -62,7 +62,7 @@ class Told:
     ) -> None:
         """Warn of rows that stay `deep`, with their mean depths and the sizes of their smaller links in m.
 
-        `duration` (s) is that of the substep.
+        `duration` (s) is that of the step.
         """
         if not self._deep and not deep.any():
             return
