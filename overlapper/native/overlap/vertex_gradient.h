@@ -17,8 +17,8 @@ struct VertexGradient {
 /// hulls. NaN also for the few rounded hulls that cannot be sliced.
 ///
 /// The surface of a rounded hull has three kinds of parts. A ball moves with its vertex. The points of a cylinder along
-/// an edge move as the points of the edge do: the derivatives are ∫ n dA, shared between both ends by ∫ s n dA, for the
-/// distance s along the edge. Facets move out by the radius keep their coordinates in the core.
+/// an edge move as the points of the edge do. The derivatives by its two ends have the sum ∫ n dA. Their shares follow
+/// from ∫ s n dA, for the distance s along the edge. Facets move out by the radius keep their coordinates in the core.
 ///
 /// If a vertex moves, points of its facets move along with their barycentric coordinates. The derivative is the
 /// integral of a vertex's coordinate times the normal over the part of the surface that the body owns. A facet of more

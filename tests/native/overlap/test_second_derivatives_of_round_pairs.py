@@ -87,7 +87,7 @@ def test_every_two_kinds_of_shapes_against_differences_of_gradients(kinds):
 def test_two_balls_have_a_closed_form():
     a, b, distance = 0.7, 0.5, 0.9
     found = overlap(Sphere(a), Placed(Sphere(b), (0, 0, distance))).hessian
-    # The volume is π (a + b − d)² (d² + 2 d (a + b) − 3 (a − b)²) / (12 d); its slope is minus the section's area.
+    # The volume is π (a + b − d)² (d² + 2 d (a + b) − 3 (a − b)²) / (12 d). Its slope is minus the area of the section.
     section = np.pi * (a**2 - ((distance**2 + a**2 - b**2) / (2 * distance)) ** 2)
     along = np.pi * (distance**2 + a**2 - b**2) / (2 * distance) * (1 - (a**2 - b**2) / distance**2)
     across = -section / distance

@@ -46,7 +46,7 @@ class Part {
   /// Surfaces of both bodies coincide or touch along a line.
   bool touching() const { return touching_; }
 
-  /// What a line of the seam runs in: the numbers of walls; kRound for a quadric.
+  /// The two surfaces that cross in a line of the seam: numbers of walls, and kRound for a quadric.
   using Sides = std::array<int, 2>;
   static constexpr int kRound = -1;
 

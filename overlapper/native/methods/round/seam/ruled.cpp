@@ -258,7 +258,7 @@ void add_radical(Part& part, std::vector<SeamPoint>& points) {
   if (!(apart > 0)) return;
   const double slack = (b.slack - a.slack) / (2 * apart);
   if (!(std::abs(slack) <= part.extent)) return;
-  // Of nearly equal bodies, the smaller one bounds the section.
+  // If bodies are nearly equal, the smaller one bounds the section.
   const Quadric& smaller = a.radius <= b.radius ? a : b;
   Ruled::in_plane(between / apart, slack, smaller, part.extent)
       .add(

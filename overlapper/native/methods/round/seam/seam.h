@@ -16,9 +16,9 @@ struct SeamPoint {
   double blur = 0;  ///< relative error of the weight by rounding
 };
 
-/// Nodes of a quadrature along the seam of a pair that overlaps, at least one body of it round. Sums over the nodes of
-/// weight f(outward[0], outward[1]) are the integral of f(n, m) / sin(n, m) along the seam, for the unit normals n and
-/// m and any f that is linear in each of them. `inside` is a point of the common set.
+/// Nodes of a quadrature along the seam of a pair that overlaps, at least one body of it round. Let f(n, m) be linear
+/// in each of the unit normals n and m. Its integral over sin(n, m) along the seam is the sum of weight times
+/// f(outward[0], outward[1]) over the nodes. `inside` is a point of the common set.
 ///
 /// Bodies are cut into pieces: parts of at most one quadric inside planes. A line where a plane or a cylinder crosses a
 /// quadric has two branches over a parameter, as the surface consists of parallel straight lines. Levin (1976) finds
