@@ -23,6 +23,12 @@ from overlapper.jobs.hand import Job
 from overlapper.jobs.worker import NotStarted
 
 
+@pytest.fixture(autouse=True)
+def as_urgent_as_other_processes(monkeypatch):
+    """Ray gives its workers a niceness of 15. On a busy machine they would wait longer than the tests allow."""
+    monkeypatch.setenv("RAY_worker_niceness", "0")
+
+
 @pytest.mark.usefixtures("balls")
 def test_a_cluster_finds_the_same_bits_while_a_node_is_killed(undisturbed):
     pytest.importorskip("ray")
