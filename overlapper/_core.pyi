@@ -554,7 +554,7 @@ class Errors:
     def vertices(self) -> float | None:
         """
         m, largest distance between the hull of the vertices and the common set (Hausdorff distance). None unless
-        overlapping.
+        overlapping. Computed on the first access, which draws the common polytope.
         """
 
     @property
@@ -653,7 +653,7 @@ class Overlap:
     def errors(self) -> Errors:
         """
         Error bound of each quantity, as `volume_error` is that of the volume. They take about as long as all
-        quantities together.
+        quantities together; `errors.vertices` takes as long as `vertices`.
         """
 
     @property

@@ -151,7 +151,7 @@ void check_gradient(const Overlap& overlap) {
 
 void check_errors(const Overlap& overlap) {
   const Errors& e = overlap.errors();
-  for (double error : {e.volume, e.area, e.centroid, e.inertia, e.vertices})
+  for (double error : {e.volume, e.area, e.centroid, e.inertia, overlap.vertices_error()})
     require(sound(error), "errors are finite and not negative");
   for (const auto& [force, moment] : e.gradient)
     require(sound(force) && sound(moment), "the errors of the gradient are finite and not negative");

@@ -407,7 +407,8 @@ double error_of_vertices(const Region& region, const Boundary& boundary, std::sp
   const Sandwich sandwich(region, bodies);
   double world = 0;
   for (Vec3 v : boundary.vertices) world = std::max(world, norm(v));
-  return sandwich.vertices() + boundary.merged + 4 * DBL_EPSILON * world;
+  const double error = sandwich.vertices() + boundary.merged + 4 * DBL_EPSILON * world, most = least_diameter(bodies);
+  return error <= most ? error : most;
 }
 
 Errors errors_beside(const StatedWithErrors& other, const Stated& stated) {
@@ -423,11 +424,10 @@ Errors errors_beside(const StatedWithErrors& other, const Stated& stated) {
   return errors;
 }
 
-Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, const Stated& stated,
-                        const Region& drawn, std::span<const Placed> bodies) {
+Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, const Stated& stated, double radius,
+                        std::span<const Placed> bodies) {
   const Measures& m = sliced.measures;
   const double relative = 4 * m.volume_error / m.volume;
-  const double radius = Sandwich(drawn, bodies).radius(m.centroid - drawn.reference - drawn.frame.origin);
   const Stated of_slices = stated_of(sliced, bodies.size());
   Errors errors;
   errors.area = relative * m.area + spread.area + std::abs(stated.area - of_slices.area);
@@ -470,12 +470,14 @@ double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b) {
 }
 
 Errors errors_of_anything(double volume, std::span<const Placed> bodies) {
-  Errors errors{volume, kInfinity, kInfinity, kInfinity, kInfinity, {}};
+  Errors errors{volume, kInfinity, kInfinity, kInfinity, {}};
   errors.gradient.assign(bodies.size(), {kInfinity, kInfinity});
   errors = no_more_than_all(std::move(errors), bodies);
   errors.inertia = volume * room(bodies).diameter * room(bodies).diameter;
   return errors;
 }
+
+double least_diameter(std::span<const Placed> bodies) { return room(bodies).diameter; }
 
 Errors no_more_than_all(Errors errors, std::span<const Placed> bodies) {
   const auto [diameter, surface, middle] = room(bodies);
@@ -483,7 +485,6 @@ Errors no_more_than_all(Errors errors, std::span<const Placed> bodies) {
   const auto cap = [](double& error, double most) { error = error <= most ? error : most; };
   cap(errors.area, surface);
   cap(errors.centroid, diameter);
-  cap(errors.vertices, diameter);
   cap(errors.inertia, surface * diameter * diameter * diameter);
   for (size_t i = 0; i < bodies.size(); ++i) {
     cap(errors.gradient[i][0], surface);

@@ -13,11 +13,10 @@ namespace overlapper {
 
 /// Error bounds of the measures of a common set, in world coordinates and SI units.
 struct Errors {
-  double volume = 0;    ///< m³
-  double area = 0;      ///< m²
-  double centroid = 0;  ///< m: distance from the true centroid
-  double inertia = 0;   ///< m⁵, for each entry
-  double vertices = 0;  ///< m: Hausdorff distance between the common set and the hull of the vertices
+  double volume = 0;                            ///< m³
+  double area = 0;                              ///< m²
+  double centroid = 0;                          ///< m: distance from the true centroid
+  double inertia = 0;                           ///< m⁵, for each entry
   std::vector<std::array<double, 2>> gradient;  ///< per body: m², length of the force's error; m³, of the moment's
 };
 
@@ -47,20 +46,21 @@ struct StatedWithErrors {
 /// share, either body may own the area.
 StatedWithErrors measured_with_errors(const Region& region, std::span<const Placed> bodies);
 
-/// The error of the vertices of a region's boundary.
+/// m: bound of the Hausdorff distance between the common set and the hull of the vertices of a region's boundary, at
+/// most the diameter of the smallest body.
 double error_of_vertices(const Region& region, const Boundary& boundary, std::span<const Placed> bodies);
 
 /// The errors of `stated`, compared with other measures whose errors are known: the known errors plus the difference of
-/// the two. The errors of the volume and of the vertices are taken over.
+/// the two. The error of the volume is taken over.
 Errors errors_beside(const StatedWithErrors& other, const Stated& stated);
 
 /// The errors of measures by slices or by a closed form, from the errors of the slices. The volume's error comes from
 /// rounding of the arguments. No measure has a degree in the arguments more than four higher than the volume. Areas and
 /// their owners depend on where surfaces are, as `spread` tells. Where surfaces are tangent, or nearly, areas change
 /// far more than the surfaces move. Ownership by slices and by a closed form has the same bounds. All other errors grow
-/// by the difference of the two. Nothing outside the region is common.
-Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, const Stated& stated,
-                        const Region& drawn, std::span<const Placed> bodies);
+/// by the difference of the two. `radius` in m bounds the distance of common points from the centroid.
+Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, const Stated& stated, double radius,
+                        std::span<const Placed> bodies);
 
 /// m⁵, for each entry.
 ///
@@ -77,6 +77,9 @@ double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b);
 
 /// The errors of any statement about bodies whose common set has at most this volume.
 Errors errors_of_anything(double volume, std::span<const Placed> bodies);
+
+/// m: the diameter of a box around the smallest body.
+double least_diameter(std::span<const Placed> bodies);
 
 /// Limits each error to what the smallest body allows. The measures must be those of some part of that body.
 Errors no_more_than_all(Errors errors, std::span<const Placed> bodies);

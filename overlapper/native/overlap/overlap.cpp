@@ -192,7 +192,7 @@ const Errors& Overlap::errors() const {
   return lazy().errors.get([this] {
     if (method_ == Method::kPaper) return errors_of_paper();
     switch (status_) {
-      case Status::kSeparated: return Errors{0, 0, 0, 0, 0, std::vector<std::array<double, 2>>(bodies().size())};
+      case Status::kSeparated: return Errors{0, 0, 0, 0, std::vector<std::array<double, 2>>(bodies().size())};
       case Status::kTouching: return errors_of_anything(volume_error(), bodies());
       case Status::kOverlapping: return errors_of_measures();
     }
@@ -210,10 +210,10 @@ Errors Overlap::errors_of_measures() const {
   const bool integrated = way() == Way::kClosedForm || way() == Way::kSlicing;
   const auto& slices = integrated ? sliced_with_area() : std::optional<MeasuresAndInertia>();
   const auto spread = slices ? overlapper::spread(overlapping_bodies(), slices->measures, measures()) : std::nullopt;
-  Errors errors = spread ? errors_of_slices(*slices, *spread, stated(), drawn(), bodies())
+  const auto radius = [&] { return reach_of_common_set(overlapping_bodies(), slices->measures.centroid); };
+  Errors errors = spread ? errors_of_slices(*slices, *spread, stated(), radius(), bodies())
                          : errors_beside(measured_with_errors(finest_region(), bodies()), stated());
   errors.volume = volume_error();
-  errors.vertices = error_of_vertices(drawn(), boundary(), bodies());
   return no_more_than_all(std::move(errors), bodies());
 }
 
@@ -222,11 +222,25 @@ Errors Overlap::errors_of_paper() const {
   const Errors of_judge = judge.errors();
   Errors errors = errors_beside({judge.stated(), of_judge}, stated());
   errors.volume = volume_error();
-  constexpr double kUnknown = std::numeric_limits<double>::infinity();
-  const bool both = status_ == Status::kOverlapping && judge.status() == Status::kOverlapping;
-  if (both) errors.vertices = of_judge.vertices + farthest_apart(boundary().vertices, judge.boundary().vertices);
-  else errors.centroid = errors.vertices = kUnknown;
+  if (status_ != Status::kOverlapping || judge.status() != Status::kOverlapping)
+    errors.centroid = std::numeric_limits<double>::infinity();
   return no_more_than_all(std::move(errors), bodies());
+}
+
+double Overlap::vertices_error() const {
+  return lazy().vertices_error.get([this] { return bound_of_vertices(); });
+}
+
+double Overlap::bound_of_vertices() const {
+  const double most = least_diameter(bodies());
+  if (method_ == Method::kPaper) {
+    const Overlap& judge = judge_of_paper();
+    if (status_ != Status::kOverlapping || judge.status() != Status::kOverlapping) return most;
+    return std::min(most, judge.vertices_error() + farthest_apart(boundary().vertices, judge.boundary().vertices));
+  }
+  if (status_ == Status::kSeparated) return 0;
+  const bool solid = status_ == Status::kOverlapping && volume_error() < volume();
+  return solid ? error_of_vertices(drawn(), boundary(), bodies()) : most;
 }
 
 bool Overlap::converged() const { return status_ != Status::kOverlapping || volume_error() <= tolerance_ * volume(); }

@@ -72,6 +72,8 @@ class Overlap {
 
   /// Error bounds of all measures; for kPaper the difference from kAuto, plus the errors of kAuto.
   const Errors& errors() const;
+  /// m: bound of the Hausdorff distance between the common set and the hull of the boundary's vertices.
+  double vertices_error() const;
 
   /// False if the bodies overlap and the error of the volume may exceed the fraction `tolerance`.
   bool converged() const;
@@ -96,6 +98,7 @@ class Overlap {
     Once<ContactErrors> contact_errors;
     Once<Region> finest_region;
     Once<Errors> errors;
+    Once<double> vertices_error;
     Once<Overlap> judge_of_paper;
   };
 
@@ -116,6 +119,7 @@ class Overlap {
   const Overlap& judge_of_paper() const;
   Errors errors_of_paper() const;
   Errors errors_of_measures() const;
+  double bound_of_vertices() const;
 
   void start();
   void start_as_in_paper();

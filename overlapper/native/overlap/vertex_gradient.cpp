@@ -219,7 +219,7 @@ std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_e
       surface.add(polygon, region.facets[f].normal);
     }
     const Errors errors = !with_errors ? none : flat ? overlap.errors() : measured_with_errors(region, bodies).errors;
-    const double owned = errors.gradient[i][0], misplaced = errors.vertices;
+    const double owned = errors.gradient[i][0], misplaced = with_errors && flat ? overlap.vertices_error() : 0;
     found[i] = surface.found(force_of(overlap, static_cast<int>(i)), owned, misplaced, with_errors);
   }
   return found;

@@ -291,7 +291,7 @@ struct ErrorsOf {
 
 std::string repr(const ErrorsOf& e) {
   std::string text = "Errors(volume=" + number(e.errors.volume) + " m³, area=" + number(e.errors.area) + " m²";
-  if (e.solid) text += ", centroid=" + number(e.errors.centroid) + " m, vertices=" + number(e.errors.vertices) + " m";
+  if (e.solid) text += ", centroid=" + number(e.errors.centroid) + " m";
   if (e.contact) text += ", depth=" + number(e.contact->depth) + " m, distance=" + number(e.contact->distance) + " m";
   return text + ")";
 }
@@ -316,10 +316,11 @@ two results, plus the bound of the second way.)");
       "m, largest distance of the true centroid. None unless overlapping.");
   cls.def_prop_ro("inertia", [](const ErrorsOf& e) { return e.errors.inertia; }, "m⁵, for each entry.");
   cls.def_prop_ro(
-      "vertices", [](const ErrorsOf& e) { return if_solid(e, e.errors.vertices); },
+      "vertices",
+      [](const ErrorsOf& e) { return if_solid(e, e.solid ? computed(e.overlap, &Overlap::vertices_error) : 0); },
       nb::sig("def vertices(self) -> float | None"),
       R"(m, largest distance between the hull of the vertices and the common set (Hausdorff distance). None unless
-overlapping.)");
+overlapping. Computed on the first access, which draws the common polytope.)");
   array_property(
       cls, "gradient",
       [](const ErrorsOf& e) {
@@ -497,7 +498,7 @@ so the status is 'touching'. 'paper': the method `paper`.)");
         });
       },
       R"(Error bound of each quantity, as `volume_error` is that of the volume. They take about as long as all
-quantities together.)");
+quantities together; `errors.vertices` takes as long as `vertices`.)");
   define_measures(cls);
   define_shape_gradient(cls);
   define_hessian(cls);

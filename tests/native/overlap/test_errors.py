@@ -122,7 +122,7 @@ def test_errors_are_finite_at_any_size():
 
 def test_errors_have_a_readable_repr():
     text = repr(overlap(CUBE, Placed(CUBE, (1, 0, 0))).errors)
-    assert text.startswith("Errors(volume=") and " m³, area=" in text and ", vertices=" in text
+    assert text.startswith("Errors(volume=") and " m³, area=" in text and ", centroid=" in text
     assert ", depth=" in text and ", distance=" in text
     three = overlap(CUBE, Placed(CUBE, (1, 0, 0)), Placed(CUBE, (0, 1, 0))).errors
     assert (three.depth, three.distance, three.witnesses) == (None, None, None) and "depth" not in repr(three)
