@@ -102,6 +102,17 @@ std::optional<MeasuresAndInertia> ball_in_polyhedron(const RoundPair& pair) {
   return found;
 }
 
+bool add_sections_of_ball(const RoundPair& pair, PatchSums& patch) {
+  const Revolved& ball = *pair.revolved[pair.self];
+  const OwnPolyhedron polyhedron(pair.flat_body().shape);
+  if ((*polyhedron).edges.empty()) return false;
+  const auto part = quadric::measure_ball(*polyhedron, in_flat(pair, ball.centre), ball.radius, true);
+  if (!part || !(part->error + pair.rounding * part->area <= kSureOfSections * part->volume)) return false;
+  const quadric::SectionView view(patch, ball.centre, pair.flat_body().pose.rotation, pair.self == 1);
+  for (size_t f = 0; f < part->sections.size(); ++f) view.add(part->sections[f], (*polyhedron).planes[f].normal, patch);
+  return true;
+}
+
 std::optional<MeasuresAndInertia> shallow_end_in_polyhedron(const RoundPair& pair) {
   const Revolved& capsule = *pair.revolved[pair.self];
   const Placed& flat = pair.flat_body();

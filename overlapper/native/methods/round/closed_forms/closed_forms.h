@@ -41,8 +41,17 @@ std::optional<MeasuresAndInertia> ball_in_polyhedron(const RoundPair& pair);
 /// A capsule or a cylinder cut by several planes of a box or a hull.
 std::optional<MeasuresAndInertia> long_body_in_polyhedron(const RoundPair& pair);
 
-/// The patch of a half-space and a ball, a capsule or a cylinder that overlap: the section of the round body by the
-/// plane. No value for any other pair. `centroid` and `area` are those of the patch.
+/// Adds to the patch the sections of a ball, of a capsule or a cylinder, or of an ellipsoid by the faces of a box or a
+/// hull. They count as seen from the front if the flat body is the second one. False if the error of the volume would
+/// exceed kSureOfSections of it.
+bool add_sections_of_ball(const RoundPair& pair, PatchSums& patch);
+bool add_sections_of_long_body(const RoundPair& pair, PatchSums& patch);
+bool add_sections_of_ellipsoid(const RoundPair& pair, PatchSums& patch);
+inline constexpr double kSureOfSections = 1e-10;
+
+/// The patch of a half-space, a box or a hull and a ball, a capsule, a cylinder or an ellipsoid that overlap: the
+/// sections of the round body by the planes. No value for other pairs, for an ellipsoid and a half-space, and for very
+/// shallow contacts. `centroid` and `area` are those of the patch.
 std::optional<Patch> section_patch(const Placed& a, const Placed& b, Vec3 centroid, Vec3 area);
 
 }  // namespace overlapper::closed_forms

@@ -185,6 +185,21 @@ std::optional<MeasuresAndInertia> cut_once(const SeenFlat& seen, const RoundPair
 
 }  // namespace
 
+bool add_sections_of_ellipsoid(const RoundPair& pair, PatchSums& patch) {
+  const SeenFlat seen(pair);
+  const quadric::Polyhedron polyhedron = seen.polyhedron();
+  if (polyhedron.edges.empty()) return false;
+  const auto part = quadric::measure_ball(polyhedron, {}, 1, true);
+  if (!part || !(part->error + seen.misplaced() * part->area <= kSureOfSections * part->volume)) return false;
+  const Pose& pose = pair.round_body().pose;
+  const quadric::Stretch stretch(stretched(pair.round_body().shape)->half_axes);
+  quadric::SectionView view(patch, pose.translation, pose.rotation, pair.self == 1);
+  view.u = scaled(stretch.half_axes, view.u), view.v = scaled(stretch.half_axes, view.v);
+  view.normal = stretch.normal(view.normal);
+  for (size_t f = 0; f < part->sections.size(); ++f) view.add(part->sections[f], polyhedron.planes[f].normal, patch);
+  return true;
+}
+
 /// If at most one plane reaches the ball, a cap has fewer terms.
 std::optional<MeasuresAndInertia> ellipsoid_in_flat(const RoundPair& pair) {
   const SeenFlat seen(pair);

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "geometry/constants.h"
+#include "geometry/rounding.h"
 #include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/closed_forms/revolved_part.h"
 
@@ -55,6 +56,25 @@ void add_end(double r, double sine, double cosine, double t, double height, doub
   });
 }
 
+/// The patch of a box or a hull and a round body.
+std::optional<Patch> patch_of_faces(const Placed& a, const Placed& b, Vec3 centroid, Vec3 area) {
+  const Placed first = a.seen_from(centroid), second = b.seen_from(centroid);
+  const double magnitude =
+      std::max(norm(first.pose.translation) + reach(first.shape), norm(second.pose.translation) + reach(second.shape));
+  const RoundPair pair = round_pair(first, second, rounding(magnitude), {});
+  if (smooth(pair.flat_body().shape) || !smooth(pair.round_body().shape)) return std::nullopt;
+  PatchSums sums({}, area);
+  const auto& revolved = pair.revolved[pair.self];
+  const bool known = stretched(pair.round_body().shape) ? add_sections_of_ellipsoid(pair, sums)
+                     : !revolved                        ? false
+                     : revolved->ball()                 ? add_sections_of_ball(pair, sums)
+                                                        : add_sections_of_long_body(pair, sums);
+  if (!known) return std::nullopt;
+  Patch patch = sums.patch();
+  patch.centre += centroid;
+  return patch;
+}
+
 }  // namespace
 
 std::optional<Patch> section_patch(const Placed& a, const Placed& b, Vec3 centroid, Vec3 area) {
@@ -62,6 +82,7 @@ std::optional<Patch> section_patch(const Placed& a, const Placed& b, Vec3 centro
   const Placed &placed = first ? a : b, &other = first ? b : a;
   const std::optional<Revolved> body = revolved(placed);
   const Plane* plane = only_plane(other.shape);
+  if (bounded(a.shape) && bounded(b.shape)) return patch_of_faces(a, b, centroid, area);
   if (!body || !plane) return std::nullopt;
   const Vec3 normal = (other.pose * *plane).normal;
   const PlaneCut cut = cut_of(*body, seen_from(other, *body), *unit_facet(other.shape, 0));

@@ -151,23 +151,18 @@ bool add_round_part(const RoundPart& part, const EnclosingPolytope& polytope, co
   return true;
 }
 
-/// The surface of a part of a cylinder is closed. The other surfaces, seen from behind, therefore have the same
+/// The surface of a part of a round is closed. The other surfaces, seen from behind, therefore have the same
 /// integrals as its curved part.
 void add_to_patch(const RoundPart& part, const PatchView& view, PatchSums& patch) {
   const bool rest = part.owner == view.owner;
-  const Vec3 u = part.turn * view.u, v = part.turn * view.v;
-  const Vec3 normal = (rest ? -1.0 : 1.0) * (part.turn * view.normal);
-  const double u0 = view.u0 + dot(part.centre, view.u), v0 = view.v0 + dot(part.centre, view.v);
+  quadric::SectionView of_part;
+  of_part.u = part.turn * view.u, of_part.v = part.turn * view.v;
+  of_part.normal = (rest ? -1.0 : 1.0) * (part.turn * view.normal);
+  of_part.u0 = view.u0 + dot(part.centre, view.u), of_part.v0 = view.v0 + dot(part.centre, view.v);
   for (size_t f = 0; f < part.owners.size(); ++f) {
     const quadric::Section& s = part.sections[f];
     if (s.area == 0 || (part.owners[f] == view.owner) == rest) continue;
-    const double w = dot(part.planes[f].normal, normal), a = s.area, fu = dot(s.first, u), fv = dot(s.first, v);
-    const auto second = [&](Vec3 p, Vec3 q) {
-      return dot(s.squares, scaled(p, q)) + s.products.x * (p.y * q.z + p.z * q.y) +
-             s.products.y * (p.z * q.x + p.x * q.z) + s.products.z * (p.x * q.y + p.y * q.x);
-    };
-    patch.add(w * a, w * (u0 * a + fu), w * (v0 * a + fv), w * (u0 * (u0 * a + 2 * fu) + second(u, u)),
-              w * (u0 * (v0 * a + fv) + v0 * fu + second(u, v)), w * (v0 * (v0 * a + 2 * fv) + second(v, v)));
+    of_part.add(s, part.planes[f].normal, patch);
   }
 }
 
@@ -247,14 +242,13 @@ struct AboutBall {
 /// True also if the common part is empty.
 bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const DistinctWalls& distinct,
               const PieceSetting& setting, Sums& sums) {
-  if (sums.patch) return false;
   const Scratch<AboutBall> about;
   const Vec3 centre = rounded(ball.centre);
   const double nothing = 16 * DBL_EPSILON * (polytope.extent() + norm(centre));
   about->become(polytope, distinct, centre, nothing);
   const size_t faces = about->planes.size();
-  const auto found =
-      quadric::measure_ball({about->corners, about->planes, about->edges, faces, about->misplaced}, {}, ball.radius);
+  const auto found = quadric::measure_ball({about->corners, about->planes, about->edges, faces, about->misplaced}, {},
+                                           ball.radius, sums.patch.has_value());
   if (!found || found->sections.empty()) return true;
   // The surface of a convex set is smaller than the surface of a convex set around it, unless a turn is wrong.
   if (!(found->volume >= 0 && found->area <= (1 + 1e-9) * polytope.surface())) return false;
@@ -264,7 +258,9 @@ bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const Distin
   if (!(piece.error <= limit(faces, setting) * ball.radius * (sums.totals.area + found->area))) return false;
   const RoundPart part{ball.owner,    {-found->flat, {}}, found->area, about->planes,
                        about->owners, found->sections,    {},          centre};
-  return add_round_part(part, polytope, setting, piece, sums.totals);
+  if (!add_round_part(part, polytope, setting, piece, sums.totals)) return false;
+  if (sums.patch) add_to_patch(part, setting.view, *sums.patch);
+  return true;
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "geometry/moments.h"
 #include "geometry/patch.h"
 #include "methods/round/pieces/enclosing_polytope.h"
+#include "methods/round/quadric/polyhedron.h"
 #include "methods/round/quadric/stretch.h"
 #include "methods/round/slicing/wall.h"
 
@@ -80,19 +81,11 @@ struct Sums {
 };
 
 /// A patch in the coordinates of pieces: its u and v, and the contribution of an area vector.
-struct PatchView {
-  double u0 = 0, v0 = 0;
-  Vec3 u, v, normal;
+struct PatchView : quadric::SectionView {
   int owner = 0;  ///< the body whose surface counts
 
   PatchView() = default;
-  PatchView(const PatchSums& patch, int owner_)
-      : u0(-dot(patch.origin(), patch.u())),
-        v0(-dot(patch.origin(), patch.v())),
-        u(patch.u()),
-        v(patch.v()),
-        normal(patch.normal()),
-        owner(owner_) {}
+  PatchView(const PatchSums& patch, int owner_) : SectionView(patch, {}, {}), owner(owner_) {}
 };
 
 /// Below this fraction of the volume, the rounding of a polytope's corners does not matter.

@@ -47,6 +47,7 @@ struct Disc {
   double second = 0;     ///< four times ∫ |y|² dA over the triangles
   Vec3 first;            ///< ∫ y dA over triangles and sectors
   Vec3 third;            ///< ∫ (|y|² − ρ²) y dA over the same
+  Section moments;       ///< with ∫ y yᵀ dA over the same, if it is wanted
   /// If the ball's centre is a corner of the face: directions from there, along the edge that arrives and the edge that
   /// leaves.
   Vec3 comes, goes;
@@ -68,6 +69,23 @@ void add_sector(Vec3 out, Disc& disc) {
   const double cube = disc.square * std::sqrt(disc.square);
   disc.first += cube / 3 * out;
   disc.third -= 2.0 / 15 * disc.square * cube * out;
+}
+
+/// Adds ∫ y yᵀ dA for the end of a sector in the direction of y, but for the mean over the angle: d(u wᵀ + w uᵀ) / dθ
+/// is 2 (1 − n nᵀ) − 4 u uᵀ for unit vectors u, and w = n × u.
+void add_end_of_sector(Vec3 y, Vec3 n, double side, Disc& disc) {
+  disc.moments.add_second(side * disc.square * disc.square / 16 / norm2(y), y, cross(n, y));
+}
+
+void add_second_moments(const DiscChord& chord, Disc& disc) {
+  const Vec3 foot = chord.height * chord.out, n = cross(chord.out, chord.along);
+  const Vec3 from = foot + chord.from * chord.along, to = foot + chord.to * chord.along;
+  const double share = chord.height * (chord.to - chord.from) / 24;
+  disc.moments.add_second(share, from, from);
+  disc.moments.add_second(share, from, to);
+  disc.moments.add_second(share, to, to);
+  if (!(norm2(from) > 0 && norm2(to) > 0)) return;
+  add_end_of_sector(from, n, -1, disc), add_end_of_sector(to, n, 1, disc);
 }
 
 /// Returns the size of the angle.
@@ -105,6 +123,7 @@ struct BallAndPolyhedron {
   double r, r2 = r * r, r3 = r * r2;
   std::vector<Disc>& discs;   ///< per plane
   std::vector<char>& inside;  ///< per corner
+  bool second_moments;        ///< of sections are wanted
 
   /// False if a plane leaves nothing of the ball.
   bool set_discs() {
@@ -223,6 +242,7 @@ void add_edge(const Edge& edge, const BallAndPolyhedron& at, BallSums& sums) {
   const DiscChord of_left{seen.out, seen.along, seen.height, from, to};
   const DiscChord of_right{seen.sine * seen.n - seen.cosine * seen.out, seen.along, seen.other, from, to};
   const double beside = left.square * add(of_left, left) + right.square * add(of_right, right);
+  if (at.second_moments) add_second_moments(of_left, left), add_second_moments(of_right, right);
   ++sums.characteristic;
   add_error(seen, of_left, of_right, from_inside, to_inside, beside, left.height, at.r3, at.polyhedron.misplaced,
             sums.part.error);
@@ -235,6 +255,7 @@ void add_corner_at_centre(Vec3 n, Disc& disc) {
   disc.around = false;
   disc.angle += angle, disc.sizes += std::abs(angle);
   add_sector(cross(disc.comes - disc.goes, n), disc);
+  add_end_of_sector(disc.comes, n, -1, disc), add_end_of_sector(disc.goes, n, 1, disc);
 }
 
 /// Adds the part of a face inside the ball, and returns it.
@@ -265,7 +286,13 @@ Section add_face(const Disc& disc, Vec3 n, bool is_cut, double r, BallSums& sums
   const Vec3 w = h * on_face * n + disc.third;
   part.squares += scaled(n, w);
   part.products += 0.5 * Vec3{n.y * w.z + n.z * w.y, n.z * w.x + n.x * w.z, n.x * w.y + n.y * w.x};
-  return {face, face * h * n + disc.first, {}, {}};
+  Section section = disc.moments;
+  section.area = face, section.first = face * h * n + disc.first;
+  const double mean = disc.square * disc.square * arcs / 8;
+  section.squares += mean * Vec3{1, 1, 1};
+  section.add_second((face * h * h - mean) / 2, n, n);
+  section.add_second(h, n, disc.first);
+  return section;
 }
 
 /// Adds the curved part to the sums over the faces.
@@ -320,11 +347,16 @@ void finish(const std::vector<Disc>& discs, double r, BallSums& sums) {
 //   the corner is in the middle of the disc, the error has no bound, because each edge gives another direction.
 // - If the edge ends on the sphere, the formula of the turn assumes planes parallel to the edge. The measured deviation
 //   counts as error.
-std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius) {
+std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius, bool second_moments) {
   thread_local std::vector<Disc> discs;
   thread_local std::vector<char> inside;
   thread_local std::vector<Section> sections;
-  BallAndPolyhedron at{.polyhedron = polyhedron, .centre = centre, .r = radius, .discs = discs, .inside = inside};
+  BallAndPolyhedron at{.polyhedron = polyhedron,
+                       .centre = centre,
+                       .r = radius,
+                       .discs = discs,
+                       .inside = inside,
+                       .second_moments = second_moments};
   if (!at.set_discs()) return std::nullopt;
   BallSums sums{{}, 2 - at.set_inside(), {}, {}};
   for (const Edge& edge : polyhedron.edges) add_edge(edge, at, sums);

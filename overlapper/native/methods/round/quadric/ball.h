@@ -18,7 +18,9 @@ struct BallPart : Moments {
 };
 
 /// The common part in closed form; no value if a plane leaves nothing of the ball. The error is infinite if a corner is
-/// at the middle of the disc that a plane cuts from the ball. Compare Strobl, Formella and Pöschel (2016).
-std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius);
+/// at the middle of the disc that a plane cuts from the ball. `second_moments` of sections may be wanted. Compare
+/// Strobl, Formella and Pöschel (2016).
+std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius,
+                                     bool second_moments = false);
 
 }  // namespace overlapper::quadric

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "geometry/patch.h"
 #include "shapes/shape.h"
 
 namespace overlapper::quadric {
@@ -21,7 +22,42 @@ struct Polyhedron {
 struct Section {
   double area = 0;
   Vec3 first;              ///< ∫ x dA
-  Vec3 squares, products;  ///< for a cylinder: ∫ x², y², z² dA and ∫ yz, zx, xy dA
+  Vec3 squares, products;  ///< ∫ x², y², z² dA and ∫ yz, zx, xy dA; for a ball only if they are wanted
+
+  /// Adds c (p qᵀ + q pᵀ) to the second moments.
+  void add_second(double c, Vec3 p, Vec3 q) {
+    squares += 2 * c * scaled(p, q);
+    products += c * Vec3{p.y * q.z + p.z * q.y, p.z * q.x + p.x * q.z, p.x * q.y + p.y * q.x};
+  }
+  /// ∫ (p · x) (q · x) dA.
+  double second(Vec3 p, Vec3 q) const {
+    return dot(squares, scaled(p, q)) + products.x * (p.y * q.z + p.z * q.y) + products.y * (p.z * q.x + p.x * q.z) +
+           products.z * (p.x * q.y + p.y * q.x);
+  }
+};
+
+/// How a patch sees sections: its coordinates are u0 + u · x and v0 + v · x, and an area vector counts by its component
+/// along `normal`.
+struct SectionView {
+  double u0 = 0, v0 = 0;
+  Vec3 u, v, normal;
+
+  SectionView() = default;
+  /// Of sections about the point `origin`, along the axes whose rotation to the world is given. They may be those of
+  /// the first body, which are seen from behind.
+  SectionView(const PatchSums& patch, Vec3 origin, const Mat3& rotation, bool of_first = false)
+      : u0(dot(origin - patch.origin(), patch.u())),
+        v0(dot(origin - patch.origin(), patch.v())),
+        u(apply_transposed(rotation, patch.u())),
+        v(apply_transposed(rotation, patch.v())),
+        normal((of_first ? -1.0 : 1.0) * apply_transposed(rotation, patch.normal())) {}
+
+  /// Adds a section by a plane with this unit normal.
+  void add(const Section& s, Vec3 plane, PatchSums& patch) const {
+    const double w = dot(plane, normal), a = s.area, fu = dot(s.first, u), fv = dot(s.first, v);
+    patch.add(w * a, w * (u0 * a + fu), w * (v0 * a + fv), w * (u0 * (u0 * a + 2 * fu) + s.second(u, u)),
+              w * (u0 * (v0 * a + fv) + v0 * fu + s.second(u, v)), w * (v0 * (v0 * a + 2 * fv) + s.second(v, v)));
+  }
 };
 
 /// A convex polyhedron as the corners around each of its faces, counter-clockwise from outside. Planes can cut it.
