@@ -10,7 +10,6 @@
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
 #include "methods/half_spaces_alone.h"
-#include "methods/round/pieces/pieces.h"
 #include "methods/round/round.h"
 #include "methods/tracing/trace.h"
 #include "shapes/canonical_order.h"
@@ -468,15 +467,6 @@ std::optional<Spread> spread(const OverlappingBodies& overlapping, const Measure
   const auto large = with_moved(moved), small = with_moved(-moved);
   if (!large || !small) return std::nullopt;
   return spread_between(*large, *small, sliced.area_error);
-}
-
-double reach_of_common_set(const OverlappingBodies& overlapping, Vec3 from) {
-  const Vec3 inside = rounded(point_inside(overlapping));
-  std::vector<const Placed*> bodies;
-  for (const Placed& body : overlapping.at.relative) bodies.push_back(&body);
-  pieces::EnclosingPolytope around;
-  pieces::enclose_closely(bodies, inside, around);
-  return around.reach(from - overlapping.at.reference - inside);
 }
 
 std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, Vec3 centroid, Vec3 area) {

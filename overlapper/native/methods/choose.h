@@ -161,9 +161,6 @@ struct Spread {
 /// No value if slicing gives up.
 std::optional<Spread> spread(const OverlappingBodies& overlapping, const Measures& sliced, const Measures& stated);
 
-/// m: upper bound of the distance of common points from a point.
-double reach_of_common_set(const OverlappingBodies& overlapping, Vec3 from);
-
 /// The patch of a pair with this centroid and area vector, by slices. No value where sliced() has none.
 std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, Vec3 centroid, Vec3 area);
 

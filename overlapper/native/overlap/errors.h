@@ -58,17 +58,15 @@ Errors errors_beside(const StatedWithErrors& other, const Stated& stated);
 /// rounding of the arguments. No measure has a degree in the arguments more than four higher than the volume. Areas and
 /// their owners depend on where surfaces are, as `spread` tells. Where surfaces are tangent, or nearly, areas change
 /// far more than the surfaces move. Ownership by slices and by a closed form has the same bounds. All other errors grow
-/// by the difference of the two. `radius` in m bounds the distance of common points from the centroid.
-Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, const Stated& stated, double radius,
+/// by the difference of the two.
+Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, const Stated& stated,
                         std::span<const Placed> bodies);
 
 /// m⁵, for each entry.
 ///
 /// Rounding in closed forms and slices, and the error of quadrature, change the common set by at most the error of the
 /// volume. The inertia has a higher degree: there the factor is four. No part of that change is farther from the
-/// centroid than the farthest point of the common set, at R. The centroid of a solid is at least a quarter of the width
-/// from either side, so a convex set is at least w = 4 R / 3 wide along the line to that point. ∫ x² dV along a line is
-/// least for a double cone: w² / 40 of the volume. So V R² is at most 45 / 2 of ∫ |x|² dV, which is half of the trace.
+/// centroid than the farthest point of the common set.
 double error_of_integrated_inertia(const MeasuresAndInertia& values, const Spread& spread);
 
 /// m: the largest distance of a point of either cloud from the nearest point of the other. Infinite if there are too

@@ -210,8 +210,7 @@ Errors Overlap::errors_of_measures() const {
   const bool integrated = way() == Way::kClosedForm || way() == Way::kSlicing;
   const auto& slices = integrated ? sliced_with_area() : std::optional<MeasuresAndInertia>();
   const auto spread = slices ? overlapper::spread(overlapping_bodies(), slices->measures, measures()) : std::nullopt;
-  const auto radius = [&] { return reach_of_common_set(overlapping_bodies(), slices->measures.centroid); };
-  Errors errors = spread ? errors_of_slices(*slices, *spread, stated(), radius(), bodies())
+  Errors errors = spread ? errors_of_slices(*slices, *spread, stated(), bodies())
                          : errors_beside(measured_with_errors(finest_region(), bodies()), stated());
   errors.volume = volume_error();
   return no_more_than_all(std::move(errors), bodies());
