@@ -20,12 +20,19 @@ class DepthSearch {
  public:
   DepthSearch(const Placed& a, const Placed& b) : a_(a), b_(b) {}
 
-  Penetration run() {
+  /// The least of some ways out.
+  Penetration begin() {
     for (int axis = 0; axis < 3; ++axis)
       for (double side : {-1.0, 1.0}) ask({axis == 0 ? side : 0, axis == 1 ? side : 0, axis == 2 ? side : 0});
     for (double x : {-1.0, 1.0})
       for (double y : {-1.0, 1.0})
         for (double z : {-1.0, 1.0}) ask({x, y, z});
+    return best_;
+  }
+
+  /// With `local_minima`, a facet close to the surface is final if Newton's method leads from there to a local minimum.
+  Penetration run(bool local_minima = false) {
+    begin();
     // The support points of a slender difference may all lie in one plane. Its support across that plane adds more,
     // unless the difference itself is flat, as for two segments.
     bool solid = hull_.build();
@@ -44,6 +51,12 @@ class DepthSearch {
       const double before = offset_[facet];
       const double reached = ask(normal);
       const int p = static_cast<int>(hull_.points.size()) - 1;
+      if (local_minima && reached - before <= kClose * extent_ && leads_to_minimum(normal)) {
+        final_.resize(hull_.facets.size(), false);
+        final_[facet] = true;
+        if (best_.depth <= before + kSettled * extent_) break;
+        continue;
+      }
       // The polytope never reaches a smooth rim. Stop when the facet's offset and the support agree to rounding.
       if (reached - before <= rounding(extent_) || !hull_.sees(facet, p)) {
         final_.resize(hull_.facets.size(), false);
@@ -72,6 +85,10 @@ class DepthSearch {
   /// Relative to the coordinates. A way out counts as the least if it is no more than this longer than the distance of
   /// the nearest facet.
   static constexpr double kSettled = 1e-12;
+  /// m, over the coordinates: the distance of facets from the surface where each sees at most one local minimum.
+  static constexpr double kClose = 1e-4;
+  static constexpr double kNear = 0.2;   ///< rad: from such a facet to its local minimum
+  static constexpr double kSame = 1e-7;  ///< rad: between directions of one minimum
 
   Vec3 corner(int facet, int i) const { return hull_.points[hull_.facets[facet].vertex[i]]; }
 
@@ -85,6 +102,14 @@ class DepthSearch {
     // `direction` moves A - B away from the origin. Body a leaves b in the opposite direction.
     if (offset < best_.depth) best_ = {offset, -direction};
     return offset;
+  }
+
+  /// Whether there is a local minimum near a direction, which then counts.
+  bool leads_to_minimum(Vec3 direction) {
+    const LocalWay at = local_way_out(a_, b_, direction);
+    if (!at.least || norm2(at.outward - direction) > kNear * kNear) return false;
+    if (norm2(at.outward + best_.normal) > kSame * kSame) ask(at.outward);
+    return true;
   }
 
   Vec3 normal_of(int facet) const {
@@ -153,6 +178,43 @@ Penetration penetration(const Placed& a, const Placed& b) {
   if (!(result.depth > 0) && radius > 0) result.open = std::numeric_limits<double>::infinity();
   result.depth += radius;
   return result;
+}
+
+LocalWay local_way_out(const Placed& a, const Placed& b, Vec3 outward) {
+  for (int round = 0; round < 20; ++round) {
+    const Vec3 farthest = a.core_support(outward) - b.core_support(-outward);
+    const double way = dot(outward, farthest);
+    const Vec3 slope = farthest - way * outward;
+    const Vec3 u = any_orthogonal(outward), v = cross(outward, u);
+    double uu = -way, uv = 0, vv = -way;
+    for (const Placed* body : {&a, &b}) {
+      if (!has_rims(body->shape)) {
+        const auto own = [&](Vec3 w) { return apply_transposed(body->pose.rotation, w); };
+        const Mat3 curved = core_slope(body->shape, own(outward));
+        uu += dot(own(u), curved * own(u)), uv += dot(own(u), curved * own(v)), vv += dot(own(v), curved * own(v));
+        continue;
+      }
+      const Vec3 tangent = cross(body->pose.rotation * Vec3{0, 0, 1}, outward);
+      const double across = norm(tangent);
+      if (!(across > 0)) return {outward, false};
+      const double curved = revolution(body->shape)->radius / (across * across * across);
+      const double tu = dot(tangent, u), tv = dot(tangent, v);
+      uu += curved * tu * tu, uv += curved * tu * tv, vv += curved * tv * tv;
+    }
+    const double determinant = uu * vv - uv * uv, su = dot(slope, u), sv = dot(slope, v);
+    if (!(uu > 0 && determinant > 0)) return {outward, false};
+    const Vec3 step = (uv * sv - vv * su) / determinant * u + (uv * su - uu * sv) / determinant * v;
+    outward = unit(outward + step);
+    if (norm(step) < 0x1p-50) return {outward, true};
+  }
+  return {outward, false};
+}
+
+Penetration curved_depth(const Placed& a, const Placed& b) { return DepthSearch(a, b).run(true); }
+
+Vec3 some_way_out(const Placed& a, const Placed& b) {
+  const Separation cores = separate_cores(a, b);
+  return !cores.origin_inside && cores.gap > 0 ? cores.normal : DepthSearch(a, b).begin().normal;
 }
 
 EnclosedDepth enclosed_depth(const Placed& a, const Placed& b) {

@@ -36,10 +36,16 @@ Across across(const WideVector& u, const WideVector& v) {
   return {unit(about - dot(u, about) * u), sine, std::min(kLostWide / sine, kLostWide + sine)};
 }
 
+/// A body in double-double and in doubles, about the same point.
+struct Body {
+  const WideBody& wide;
+  const Placed& plain;
+};
+
 /// The lengths of the ways out of A - B, of the cores. Directions point out of A - B.
 class Ways {
  public:
-  Ways(const WideBody& a, const WideBody& b) : a_(a), b_(b), lost_(0x1p-94 * (a.reach() + b.reach())) {}
+  Ways(Body a, Body b) : a_(a), b_(b), lost_(0x1p-94 * (a.wide.reach() + b.wide.reach())) {}
 
   DoubleDouble shortest() const { return shortest_; }
   const WideVector& direction() const { return direction_; }
@@ -48,13 +54,23 @@ class Ways {
 
   /// The way along a unit direction.
   double measure(const WideVector& direction) {
-    const DoubleDouble way = dot(direction, a_.core_support(direction) - b_.core_support(-direction));
+    const DoubleDouble way = dot(direction, a_.wide.core_support(direction) - b_.wide.core_support(-direction));
     if (way < shortest_) shortest_ = way, direction_ = direction;
     return way.head;
   }
 
+  /// A lower bound of the way along a direction. Measures the way unless doubles prove that it is not the shortest.
+  double at_least(const WideVector& direction) {
+    const Vec3 plain = unit(rounded(direction));
+    const double way = dot(plain, a_.plain.core_support(plain) - b_.plain.core_support(-plain));
+    const double least = way - kPlain * (a_.wide.reach() + b_.wide.reach());
+    return least > shortest_.head ? least : measure(unit(direction)) - lost_;
+  }
+
  private:
-  const WideBody &a_, &b_;
+  static constexpr double kPlain = 0x1p-44;  ///< error of a way in doubles, over the size of the numbers
+
+  Body a_, b_;
   double lost_;
   DoubleDouble shortest_{kInfinity};
   WideVector direction_;
@@ -70,8 +86,7 @@ struct Candidate {
 
 class PolytopeSearch {
  public:
-  PolytopeSearch(const WideBody& a, const WideBody& b, const WideVector& about)
-      : ways(a, b), a_(a, about), b_(b, about) {}
+  PolytopeSearch(Body a, Body b, const WideVector& about) : ways(a, b), a_(a.wide, about), b_(b.wide, about) {}
 
   Ways ways;
   double lower = kInfinity;  ///< m: lower bound of all ways, if the cores have a common point
@@ -269,7 +284,7 @@ std::optional<double> nearest_on_ellipse(double k, double s, double x, double y)
 /// nearest one of the ellipse.
 class RimSearch {
  public:
-  RimSearch(const WideBody& a, const WideBody& b) : ways(a, b), a_(a), b_(b) {}
+  RimSearch(Body a, Body b) : ways(a, b), a_(a.wide), b_(b.wide) {}
 
   Ways ways;
   double lower = kInfinity;  ///< m: least of the measured ways
@@ -339,15 +354,14 @@ class RimSearch {
       if (!angle) continue;
       const WideVector direction = side * std::cos(*angle) * upward + k * std::sin(*angle) * level;
       // At a local minimum the excess length of the way is at most its slope, which is rounding, times the angle.
-      look(sign * unit(direction), lost, 0x1p-46 * (std::abs(from_cap) + std::abs(y) + r));
+      look(sign * direction, lost, 0x1p-46 * (std::abs(from_cap) + std::abs(y) + r));
     }
   }
 
   /// Measures the way along a direction with the error `lost`; the way is at most `too_long` longer than the local
   /// minimum.
   void look(const WideVector& direction, double lost, double too_long = 0) {
-    const double way = ways.measure(direction);
-    lower = std::min(lower, way - ways.lost() - lost * (a_.reach() + b_.reach()) - too_long);
+    lower = std::min(lower, ways.at_least(direction) - lost * (a_.reach() + b_.reach()) - too_long);
   }
 
   const WideBody &a_, &b_;
@@ -412,7 +426,7 @@ class EllipsoidSearch {
   }
 
   void look(const WideVector& direction, double too_long) {
-    lower = std::min(lower, ways_.measure(sign_ * unit(direction)) - ways_.lost() - too_long);
+    lower = std::min(lower, ways_.at_least(sign_ * direction) - too_long);
   }
 
   Ways& ways_;
@@ -424,36 +438,12 @@ class EllipsoidSearch {
   double reach_;
 };
 
-/// The way out where two curved surfaces meet: a local minimum of the support function, by Newton's method from a
-/// direction near it.
-Vec3 between_curved(const Placed& a, const Placed& b, Vec3 outward) {
-  for (int round = 0; round < 20; ++round) {
-    const Vec3 farthest = a.core_support(outward) - b.core_support(-outward);
-    const double way = dot(outward, farthest);
-    const Vec3 slope = farthest - way * outward;
-    const Vec3 u = any_orthogonal(outward), v = cross(outward, u);
-    double uu = -way, uv = 0, vv = -way;
-    for (const Placed* body : {&a, &b}) {
-      if (!has_rims(body->shape)) {
-        const auto own = [&](Vec3 w) { return apply_transposed(body->pose.rotation, w); };
-        const Mat3 curved = core_slope(body->shape, own(outward));
-        uu += dot(own(u), curved * own(u)), uv += dot(own(u), curved * own(v)), vv += dot(own(v), curved * own(v));
-        continue;
-      }
-      const Vec3 tangent = cross(body->pose.rotation * Vec3{0, 0, 1}, outward);
-      const double across = norm(tangent);
-      if (!(across > 0)) return outward;
-      const double curved = revolution(body->shape)->radius / (across * across * across);
-      const double tu = dot(tangent, u), tv = dot(tangent, v);
-      uu += curved * tu * tu, uv += curved * tu * tv, vv += curved * tv * tv;
-    }
-    const double determinant = uu * vv - uv * uv, su = dot(slope, u), sv = dot(slope, v);
-    if (!(uu > 0 && determinant > 0)) return outward;
-    const Vec3 step = (uv * sv - vv * su) / determinant * u + (uv * su - uu * sv) / determinant * v;
-    outward = unit(outward + step);
-    if (norm(step) < 0x1p-50) break;
-  }
-  return outward;
+/// Measures the least way out where two curved surfaces meet. Returns a lower bound of all ways, or of that way alone.
+double measure_curved(const Placed& a, const Placed& b, bool bounds, Ways& ways) {
+  const EnclosedDepth enclosed = bounds ? enclosed_depth(a, b) : EnclosedDepth{curved_depth(a, b), kInfinity};
+  const Vec3 outward = -enclosed.depth.normal;
+  for (const Vec3 way : {outward, local_way_out(a, b, outward).outward}) ways.measure(unit(wide(way)));
+  return std::min(enclosed.lower, ways.shortest().head - ways.lost());
 }
 
 /// True if every way through a point where the rims of two nearly parallel cylinders meet is at least as long as `way`.
@@ -485,8 +475,9 @@ bool rims_meet_farther_out(const Rims& a, const Rims& b, double way) {
 
 }  // namespace
 
-WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint) {
+WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint, bool bounds) {
   const WideBody wide_a(a, wide(reference)), wide_b(b, wide(reference));
+  const Body body_a{wide_a, a}, body_b{wide_b, b};
   const DoubleDouble radii = two_sum(core_radius(a.shape), core_radius(b.shape));
   const Vec3 outward = norm2(hint) > 0 ? -hint : Vec3{0, 0, 1};
   const auto found = [&](const Ways& ways, double lower) {
@@ -497,14 +488,17 @@ WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 
   const auto is_polytope = [](const Shape& shape) { return !smooth(shape) && bounded(shape); };
   if (is_polytope(a.shape) && is_polytope(b.shape) && norm2(hint) > 0) {
     const bool a_is_smaller = radius(a.shape) < radius(b.shape);
-    PolytopeSearch search(wide_a, wide_b, a_is_smaller ? wide_a.support(wide(outward)) : wide_b.support(wide(hint)));
+    PolytopeSearch search(body_a, body_b, a_is_smaller ? wide_a.support(wide(outward)) : wide_b.support(wide(hint)));
     if (search.run(outward) && search.lower > 0) return found(search.ways, search.lower);
   }
   const double lost = 0x1p-94 * (wide_a.reach() + wide_b.reach());
-  const WideGap gap = wide_gap(wide_a, wide_b, lost / 4);
+  const bool common = !bounds && radii.head == 0;  // bodies that overlap are their cores
+  WideGap gap;
+  if (common) gap.witness_a = wide_a.core_support(wide(outward));
+  else gap = wide_gap(wide_a, wide_b, lost / 4);
   if (norm2(gap.normal) > 0) {
     // GJK may not have converged on a curved surface; the hint may then be better.
-    Ways ways(wide_a, wide_b);
+    Ways ways(body_a, body_b);
     const bool curved = bounded(a.shape) && bounded(b.shape) && (has_curved_core(a.shape) || has_curved_core(b.shape));
     if (curved) ways.measure(unit(wide(outward)));
     const double certified = curved ? std::max(gap.certified, -(ways.shortest() + radii).head) : gap.certified;
@@ -513,16 +507,14 @@ WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 
   // Cores without an interior, or without a common point, separate at once if one of them moves to the other.
   const double touching = -(std::max(gap.distance, gap.most) + radii.head) - lost;
   if (stretched(a.shape) || stretched(b.shape)) {
-    Ways ways(wide_a, wide_b);
+    Ways ways(body_a, body_b);
     ways.measure(unit(wide(outward)));
     const bool first = stretched(a.shape);
     EllipsoidSearch search(first ? wide_a : wide_b, first ? wide_b : wide_a, ways, first ? 1 : -1);
     const WideBody& other = first ? wide_b : wide_a;
     if (has_curved_core(other.shape)) {
       if (has_rims(other.shape)) search.of_cylinder(Rims(other));
-      const EnclosedDepth enclosed = enclosed_depth(a, b);
-      ways.measure(unit(wide(between_curved(a, b, -enclosed.depth.normal))));
-      search.lower = std::min(enclosed.lower, ways.shortest().head - ways.lost());
+      search.lower = measure_curved(a, b, bounds, ways);
     } else {
       NearPolytope polytope(other, gap.witness_a);
       const double room = up(ways.shortest().head * (1 + 0x1p-40)) + ways.lost();
@@ -536,27 +528,23 @@ WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 
     return found(ways, search.lower > 0 ? search.lower : touching);
   }
   if (core_kind(a.shape) == CoreKind::kCurved || core_kind(b.shape) == CoreKind::kCurved) {
-    const EnclosedDepth enclosed = enclosed_depth(a, b);
-    Ways ways(wide_a, wide_b);
-    for (const Vec3 way : {outward, -enclosed.depth.normal, between_curved(a, b, -enclosed.depth.normal)})
-      ways.measure(unit(wide(way)));
-    const double lower = std::min(enclosed.lower, ways.shortest().head - ways.lost());
+    Ways ways(body_a, body_b);
+    ways.measure(unit(wide(outward)));
+    const double lower = measure_curved(a, b, bounds, ways);
     return found(ways, lower > 0 ? lower : touching);
   }
   if (has_rims(a.shape) || has_rims(b.shape)) {
-    RimSearch search(wide_a, wide_b);
+    RimSearch search(body_a, body_b);
     search.run(outward, gap.witness_a);
     if (has_rims(a.shape) && has_rims(b.shape)) {
-      const EnclosedDepth enclosed = enclosed_depth(a, b);
-      const double coarse = enclosed.lower;
-      search.ways.measure(unit(wide(between_curved(a, b, -enclosed.depth.normal))));
+      const double coarse = measure_curved(a, b, bounds, search.ways);
       const double way = std::min(search.lower, search.ways.shortest().head);
       if (coarse > way / 2 && rims_meet_farther_out(Rims(wide_a), Rims(wide_b), way)) search.lower = way - lost;
       else search.lower = std::min(way, coarse);
     }
     return found(search.ways, search.lower > 0 ? search.lower : touching);
   }
-  PolytopeSearch search(wide_a, wide_b, gap.witness_a);
+  PolytopeSearch search(body_a, body_b, gap.witness_a);
   if (!search.run(outward)) search.lower = enclosed_depth(a, b).lower;
   return found(search.ways, search.solid() && search.lower > 0 ? search.lower : touching);
 }

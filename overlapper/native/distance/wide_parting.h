@@ -18,7 +18,7 @@ struct WideParting {
 /// normals of these facets include the least way out. Coordinates are relative to a point near the contact, where
 /// rounding errors are small. Doubles with error bounds prove for nearly all normals that the way is longer.
 /// Double-doubles measure the rest. Cylinders and ellipsoids have normals of their own; EPA bounds the ways that two of
-/// these leave open.
-WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint);
+/// these leave open. Without `bounds`, the bodies must overlap, and the bounds may not hold; this is faster.
+WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint, bool bounds = true);
 
 }  // namespace overlapper

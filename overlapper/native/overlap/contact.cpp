@@ -28,8 +28,8 @@ double rounding_between(const Placed& a, const Placed& b) {
   return rounding(reach(a, reach(b, between)));
 }
 
-Penetration parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint) {
-  const WideParting way = wide_parting(a, b, reference, hint);
+Penetration parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint, bool bounds = true) {
+  const WideParting way = wide_parting(a, b, reference, hint, bounds);
   return {way.depth, way.normal};
 }
 
@@ -73,10 +73,11 @@ Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool 
   const Placed &a = at.relative[0], &b = at.relative[1];
   Contact contact;
   if (status == Status::kOverlapping) {
-    Penetration p = penetration(a, b);
+    const bool curved = has_curved_core(a, b);
+    Penetration p = curved ? parting(a, b, at.reference, some_way_out(a, b), false) : penetration(a, b);
     // If the cores nearly touch, the direction and the length of the way out are uncertain by more than rounding.
     const bool open = in_doubt(p.depth, a, b) || p.open > rounding_between(a, b);
-    if (doubtful || has_curved_core(a, b) || open) p = parting(a, b, at.reference, p.normal);
+    if (!curved && (doubtful || open)) p = parting(a, b, at.reference, p.normal);
     contact.depth = p.depth;
     contact.normal = p.normal;
   } else {
