@@ -1031,8 +1031,10 @@ class Overlaps:
         """(p, 3) centre of the common volume, m; NaN unless overlapping."""
 
     @property
-    def area(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(p,) m², of the surface of the common polytope."""
+    def area_bound(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p,) m², upper bound of `area`. It is the area itself in pairs without an ellipsoid.
+        """
 
     @property
     def normal(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1061,6 +1063,13 @@ class Overlaps:
     def widened(self) -> numpy.typing.NDArray[numpy.bool_]:
         """
         (p,) True where the volume was computed again in double-double arithmetic.
+        """
+
+    @property
+    def area(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p,) m², of the surface of the common set. Computed on the first use for pairs with an ellipsoid, which takes tens or
+        hundreds of microseconds for each.
         """
 
     @property

@@ -40,7 +40,7 @@ Overlaps::Row row_of(Overlap overlap) {
   row.measures.way = overlap.way();
   if (overlap.status() == Status::kSeparated) return row;
   if (overlap.status() == Status::kOverlapping) row.measures = overlap.measures();
-  row.measures.area = overlap.area(), row.measures.volume_error = overlap.volume_error();
+  row.measures.volume_error = overlap.volume_error();
   row.measures.facets_touched = overlap.facets_touched();
   row.depth = overlap.contact().depth;
   row.normal = overlap.contact().normal;
@@ -134,6 +134,19 @@ Placed Overlaps::placed(int body) const {
 std::shared_ptr<Overlap> Overlaps::overlap(size_t row) const {
   if (auto known = source[row].lock()) return known;
   return std::make_shared<Overlap>(placed(pairs[row][0]), placed(pairs[row][1]), tolerance, method);
+}
+
+const std::vector<double>& Overlaps::areas() const {
+  return areas_->get([this] {
+    std::vector<double> found = area_bound;
+    for (size_t row = 0; row < size(); ++row) {
+      const auto [a, b] = pairs[row];
+      if (status[row] == static_cast<std::int8_t>(Status::kOverlapping) &&
+          (stretched((*shapes)[a]) || stretched((*shapes)[b])))
+        found[row] = overlap(row)->area();
+    }
+    return found;
+  });
 }
 
 const Overlaps::Patches& Overlaps::patches() const {

@@ -48,7 +48,7 @@ struct Overlaps {
   std::vector<std::int8_t> status, way;
   std::vector<char> widened;
   std::vector<int> facets_touched;
-  std::vector<double> volume, volume_error, area, depth;
+  std::vector<double> volume, volume_error, area_bound, depth;
   std::vector<Vec3> centroid, normal;
   std::vector<BodyGradients> gradient;
 
@@ -77,6 +77,7 @@ struct Overlaps {
   Overlaps select(std::span<const std::int64_t> rows) const;
   /// Computed on first use, pair by pair.
   const Patches& patches() const;
+  const std::vector<double>& areas() const;
   const std::vector<ShapeGradients>& shape_gradients() const;
   const DepthGradients& depth_gradients() const;
   const std::vector<PoseHessian>& hessians() const;
@@ -88,6 +89,7 @@ struct Overlaps {
 
   template <class T>
   using Shared = std::shared_ptr<Once<T>>;
+  Shared<std::vector<double>> areas_ = std::make_shared<Once<std::vector<double>>>();
   Shared<Patches> patches_ = std::make_shared<Once<Patches>>();
   Shared<std::vector<ShapeGradients>> shape_gradients_ = std::make_shared<Once<std::vector<ShapeGradients>>>();
   Shared<DepthGradients> depth_gradients_ = std::make_shared<Once<DepthGradients>>();
@@ -124,8 +126,8 @@ inline constexpr std::tuple kColumns{
     Column<Vec3>{"centroid", &Overlaps::centroid,
                  [](const Overlaps::Row& row) { return centroid_or_nan(row.measures); },
                  "(p, 3) centre of the common volume, m; NaN unless overlapping."},
-    Column<double>{"area", &Overlaps::area, [](const Overlaps::Row& row) { return row.measures.area; },
-                   "(p,) m², of the surface of the common polytope."},
+    Column<double>{"area_bound", &Overlaps::area_bound, [](const Overlaps::Row& row) { return row.measures.area; },
+                   "(p,) m², upper bound of `area`. It is the area itself in pairs without an ellipsoid."},
     Column<Vec3>{"normal", &Overlaps::normal, [](const Overlaps::Row& row) { return row.normal; },
                  "(p, 3) unit, from b to a as pybullet's contactNormalOnB; 0 for pairs that are separated."},
     Column<double>{"depth", &Overlaps::depth, [](const Overlaps::Row& row) { return row.depth; },

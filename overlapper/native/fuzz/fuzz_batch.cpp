@@ -113,7 +113,7 @@ void require_equal_to_overlap(const Overlaps& row) {
   const Overlap single(kept->bodies()[0], kept->bodies()[1], row.tolerance, row.method);
   const bool separated = single.status() == Status::kSeparated;
   require(row.status[0] == static_cast<std::int8_t>(single.status()), "the status of the Overlap");
-  require(row.volume[0] == single.volume() && row.area[0] == single.area(), "the volume and area of the Overlap");
+  require(row.volume[0] == single.volume() && row.areas()[0] == single.area(), "the volume and area of the Overlap");
   require(row.volume_error[0] == (separated ? 0 : single.volume_error()), "the volume error of the Overlap");
   if (separated) return;
   const Contact& contact = single.contact();

@@ -253,6 +253,13 @@ void define_patch_column(nb::class_<Overlaps>& cls, const char* name, std::vecto
 
 void define_columns(nb::class_<Overlaps>& cls) {
   std::apply([&](const auto&... column) { (define_column(cls, column), ...); }, kColumns);
+  define_column<double>(
+      cls, "area",
+      [](const Overlaps& overlaps) -> const auto& {
+        return unlocked([&]() -> const std::vector<double>& { return overlaps.areas(); });
+      },
+      R"((p,) m², of the surface of the common set. Computed on the first use for pairs with an ellipsoid, which takes tens or
+hundreds of microseconds for each.)");
   cls.def_prop_ro(
       "patch_area",
       [](nb::handle self) {

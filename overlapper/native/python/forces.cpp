@@ -93,6 +93,11 @@ std::vector<std::optional<Top>> tops_of(const Overlaps& found, std::span<const V
   return seen;
 }
 
+/// Whether an area of this size has a direction, rounding aside.
+bool has_direction(const Overlaps& found, size_t row, double size) {
+  return size > kNoDirection * found.area_bound[row] || (size > 0 && size > kNoDirection * found.overlap(row)->area());
+}
+
 /// The patch of each row: that of the top for prisms.
 std::vector<Patch> patches_of(const Overlaps& found, std::span<const std::optional<Top>> tops) {
   std::vector<Patch> patches;
@@ -102,7 +107,7 @@ std::vector<Patch> patches_of(const Overlaps& found, std::span<const std::option
     if (!tops[i]) {
       patches.push_back(found.patch(i));
       patches.back().area = area;
-    } else if (dot(area, tops[i]->up) > kNoDirection * found.area[i]) {
+    } else if (has_direction(found, i, dot(area, tops[i]->up))) {
       patches.push_back(lifted(found.patch(i, tops[i]->up), found.centroid[i], tops[i]->normal));
     } else {
       patches.push_back(PatchSums({}, {}).patch());
@@ -152,7 +157,7 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
     patch.force = stiffness[i] * found.volume[i];
     patch.centroid = found.centroid[i];
     const auto& [area, centre, moments, distance] = shared[i];
-    if (!(norm(area) > kNoDirection * found.area[i]) || !finite(centre)) continue;
+    if (!has_direction(found, i, norm(area)) || !finite(centre)) continue;
     patch.area = norm(area);
     patch.normal = unit(area);
     patch.centre = centre, patch.moments = moments, patch.distance = distance;

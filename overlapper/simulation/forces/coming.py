@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from overlapper import Overlaps
 from overlapper.simulation.asked_pairs import Among
-from overlapper.simulation.forces.forces import NO_PATCH
+from overlapper.simulation.forces.forces import have_patches
 from overlapper.simulation.forces.masses import Masses
 from overlapper.simulation.layout import Pose
 from overlapper.simulation.model import Array
@@ -88,8 +88,7 @@ def followed(frequency2: float, duration: float) -> int:
 
 def _swallowed(found: Overlaps) -> set[tuple[int, int]]:
     """Return the pairs in which one body lies wholly in the other: their overlap has no patch."""
-    area = found.gradient[:, 1, :3]
-    rows = (found.volume > 0) & ((area * area).sum(axis=1) <= (NO_PATCH * found.area) ** 2)
+    rows = (found.volume > 0) & ~have_patches(found, np.linalg.norm(found.gradient[:, 1, :3], axis=1))
     return {(a, b) for a, b in found.pairs[rows].tolist()} if rows.any() else set()
 
 

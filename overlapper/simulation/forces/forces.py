@@ -215,6 +215,14 @@ class Forces(Tabular):
         )
 
 
+def have_patches(found: Overlaps, sizes: Array) -> NDArray[np.bool_]:
+    """Return (p,) whether area vectors of these sizes in m² are more than rounding of the common surface."""
+    clear: NDArray[np.bool_] = sizes > NO_PATCH * found.area_bound
+    if (clear | (found.area_bound == 0)).all():
+        return clear
+    return np.asarray(sizes > NO_PATCH * found.area)
+
+
 def mean(
     contacts: Contacts,
     parts: Sequence[tuple[float, Forces]],
@@ -231,7 +239,7 @@ def mean(
     count = 1 + max(int(each.pairs.max(initial=0)) for each in (found, *(part.contacts.overlaps for _, part in parts)))
     codes = _codes(found, count)
     size = np.linalg.norm(area, axis=1)
-    directed = (size > NO_PATCH * found.area) | (found.volume == 0)
+    directed = have_patches(found, size) | (found.volume == 0)
     normal: Array = np.array(found.normal)
     patches = directed & (size > 0)
     normal[patches] = area[patches] / size[patches, None]
