@@ -16,12 +16,14 @@ from argparse import ArgumentParser, Namespace
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from itertools import combinations_with_replacement
+from operator import attrgetter
 from pathlib import Path
 from statistics import mean, median
 
 import numpy as np
 
 from harness import results
+from harness.peers import Cold
 from harness.timing import in_turn, on_one_processor
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere, overlap
 
@@ -31,6 +33,14 @@ PAGE = "speed.round_page"
 ENCLOSED = 4  # a pair that is enclosed by planes takes milliseconds: of such classes, so many times fewer
 MARGIN = 1e-3  # m, what Bullet adds around convex meshes
 COLUMNS = ("part", "name", "figure", "value")
+
+# Classes whose other quantities are measured, too, and what single calls are asked for.
+QUANTITIES = (
+    *("box, box", "box, ball", "box, capsule", "box, cylinder", "box, ellipsoid", "box, rounded hull", "ball, ball"),
+    *("capsule, capsule", "cylinder, cylinder", "ellipsoid, ellipsoid"),
+)
+SIX = attrgetter("volume", "centroid", "area", "normal", "depth", "gradient")
+ASKED = {"volume": attrgetter("volume"), "patch": attrgetter("patch_moments"), "errors": attrgetter("errors")}
 
 Pair = tuple[Placed, Placed]
 Figure = tuple[str, str, str, float]  # part, name, figure, value
@@ -95,6 +105,28 @@ def measured_classes(classes: dict[str, list[Pair]], rounds: int) -> Iterator[Fi
             yield "class", name, way, 100 * count / len(pairs)
 
 
+def measured_quantities(classes: dict[str, list[Pair]], rounds: int) -> Iterator[Figure]:
+    """The medians of single calls that are asked for other quantities, and the time of a pair in a batch."""
+    for name in QUANTITIES:
+        pairs = classes[name]
+        batch = Cold(pairs)
+        for figure, ask in ASKED.items():
+            calls = [lambda a=a, b=b: ask(overlap(a, b)) for a, b in pairs]  # noqa: B023
+            yield "quantity", name, figure, 1e6 * median(map(median, in_turn(calls, rounds, clock=time.perf_counter)))
+        calls = [lambda a=a, b=b: SIX(overlap(a, b)) for a, b in pairs]
+
+        def together() -> None:
+            SIX(batch())  # noqa: B023
+
+        def alone() -> None:
+            for call in calls:  # noqa: B023
+                call()
+
+        both = in_turn([alone, together], max(rounds, 3), clock=time.perf_counter)
+        for figure, samples in zip(("six, calls", "six, batch"), both):
+            yield "quantity", name, figure, 1e6 * median(samples) / len(pairs)
+
+
 def measured_margins(rng: np.random.Generator, count: int, rounds: int) -> Iterator[Figure]:
     """The same pairs of meshes as they are and with margins."""
 
@@ -122,6 +154,10 @@ def measure(chosen: Namespace, path: Path) -> None:
     on_one_processor()
     rng = np.random.default_rng(0)
     classes = {", ".join(kinds): made(rng, kinds, chosen.pairs) for kinds in CLASSES}
-    found = [*measured_classes(classes, chosen.rounds), *measured_margins(rng, chosen.pairs, chosen.rounds)]
+    found = [
+        *measured_classes(classes, chosen.rounds),
+        *measured_quantities(classes, chosen.rounds),
+        *measured_margins(rng, chosen.pairs, chosen.rounds),
+    ]
     with results.writing(path, COLUMNS, results.today()) as write:
         write((*names, f"{value:.4g}") for *names, value in found)
