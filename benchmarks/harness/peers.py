@@ -18,7 +18,7 @@ own; those that take points build the hull themselves, as their users would.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import cycle
@@ -61,9 +61,6 @@ from overlapper import (
 Setting = float | int | str | None
 Asked = Callable[[], Any]
 GivenBodies = Sequence[Given]
-Ring = list[int]
-
-MOST_IN_NUMPY = 200  # vertices of either body, for a peer that looks at all of them for every plane of the other
 
 # In tables: the peer was not asked; it has no answer; more iterations of coal change its answer.
 NOT_ASKED, NO_ANSWER, OUT_OF_ITERATIONS = "-", "no answer", "out of iterations"
@@ -186,72 +183,14 @@ def auto_distance(bodies: GivenBodies, way: str | None) -> Asked:
 # Volumes
 
 
-def clipping(bodies: GivenBodies, _: None) -> Asked:
-    """The first body cut by the planes of the others in plain doubles, as r3d does it: the signs of the vertices decide
-    what is kept, so that the mesh stays closed whatever the rounding. In numpy."""
+def r3d(bodies: GivenBodies, _: None) -> Asked:
+    """The first body cut by the planes of the others in doubles, in C."""
+    from harness.r3d import volume
+
     if any(map(is_round, bodies)):
         raise Unfit("round shapes")
     first, *others = bodies
-    if min(len(vertices(body)) for body in bodies) > MOST_IN_NUMPY:
-        raise Unfit(f"more than {MOST_IN_NUMPY} vertices take minutes in numpy")
-    hull = Hull(vertices(first))
-    whole, facets = list(hull.vertices), [ring.tolist() for ring in hull.facets]
-    cuts = np.vstack([planes(other) for other in others])
-
-    def cut() -> float:
-        kept, rings = list(whole), facets
-        for plane in cuts:
-            rings = clipped(kept, rings, plane)
-        return enclosed_volume(np.array(kept), rings)
-
-    return cut
-
-
-def clipped(vertices: list[np.ndarray], rings: list[Ring], plane: np.ndarray) -> list[Ring]:
-    """The facets left on the inner side of a plane, and those that close the cut. New vertices are appended."""
-    level = np.array(vertices) @ plane[:3] + plane[3]
-    old, crossings = len(vertices), {}
-
-    def crossing(u: int, v: int) -> int:
-        edge = (min(u, v), max(u, v))
-        if edge not in crossings:
-            crossings[edge] = len(vertices)
-            vertices.append(vertices[u] + level[u] / (level[u] - level[v]) * (vertices[v] - vertices[u]))
-        return crossings[edge]
-
-    kept, following = [], {}
-    for ring in rings:
-        part = []
-        for u, v in edges(ring):
-            if level[u] <= 0:
-                part.append(u)
-            if (level[u] <= 0) != (level[v] <= 0):
-                part.append(crossing(u, v))
-        if part:
-            kept.append(part)
-            # Two new vertices in a row are a way out and the next way in; the cut runs along them the other way.
-            following.update({v: u for u, v in edges(part) if min(u, v) >= old})
-    return kept + list(cycles(following))
-
-
-def edges(ring: Ring) -> Iterable[tuple[int, int]]:
-    return zip(ring, ring[1:] + ring[:1])
-
-
-def cycles(following: dict[int, int]) -> Iterator[Ring]:
-    while following:
-        ring = [next(iter(following))]
-        while (v := following.pop(ring[-1])) != ring[0]:
-            ring.append(v)
-        yield ring
-
-
-def enclosed_volume(vertices: np.ndarray, rings: list[Ring]) -> float:
-    if not rings:
-        return 0.0
-    vertices = vertices - vertices[rings[0][0]]
-    fans = ((vertices[ring[0]], np.cross(vertices[ring[1:-1]], vertices[ring[2:]])) for ring in rings if len(ring) > 2)
-    return sum(float(crosses.sum(0) @ at) / 6 for at, crosses in fans)
+    return volume(Hull(vertices(first)), np.vstack([planes(other) for other in others]))
 
 
 def scipy_volume(bodies: GivenBodies, way: str) -> Asked:
@@ -543,7 +482,7 @@ PEERS: dict[str, dict[str, Peer]] = {
         ),
         "auto, warm batch": Peer(auto_warm, (1e-3,), (1e-3,), posed=True, exact=False, together=True, look=None),
         "paper": Peer(paper, posed=True, look=Look("#f08a00", "s", size=5.5)),
-        "clipping": Peer(clipping, look=Look("#7a4a21", "v", size=5.5)),
+        "r3d": Peer(r3d, look=Look("#7a4a21", "v", size=5.5)),
         "scipy": Peer(scipy_volume, BY_QHULL, BY_QHULL, "linprog", look=Look("#1f5fbf", "^", size=6)),
         "manifold3d": Peer(manifold, ("prebuilt", "moved"), SEGMENTS, 64, look=Look("#1a8a3a", "P", size=7.5)),
         "manifold3d, by the clock": Peer(

@@ -255,12 +255,17 @@ def test_an_exception_is_an_answer_and_a_missing_package_is_not():
         peer.ask(*DEEP.bodies)
 
 
-def test_clipping_and_halfspaces_find_the_volume_of_hulls_in_general_position():
+def test_halfspaces_find_the_volume_of_hulls_in_general_position():
     for seed in range(5):
         bodies = families.make("general", seed).bodies
         truth = float(question(*bodies).volume)
-        assert peers.HardCase("volume", "clipping")(*bodies) == pytest.approx(truth, rel=1e-12)
         assert peers.HardCase("volume", "scipy")(*bodies) == pytest.approx(truth, rel=1e-9)
+
+
+def test_r3d_is_missing_where_no_folder_is_named(monkeypatch):
+    monkeypatch.delenv("R3D", raising=False)
+    with pytest.raises(ImportError, match=r"^the variable R3D names no folder with the sources of r3d$"):
+        peers.HardCase("volume", "r3d")(*DEEP.bodies)
 
 
 def test_the_page_says_what_the_committed_results_say():
