@@ -14,6 +14,7 @@
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
 #include "methods/round/closed_forms/closed_forms.h"
+#include "overlap/centroid_gradient.h"
 #include "overlap/depth_gradient.h"
 #include "overlap/second_derivatives.h"
 #include "overlap/shape_gradient.h"
@@ -182,6 +183,19 @@ const DepthGradients& Overlaps::depth_gradients() const {
       if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) continue;
       const DepthGradient one = depth_gradient(*overlap(row));
       found.pose[row] = one.pose, found.shape[row] = one.shape;
+    }
+    return found;
+  });
+}
+
+const CentroidGradients& Overlaps::centroid_gradients() const {
+  return centroid_gradients_->get([this] {
+    CentroidGradients found;
+    found.pose.resize(size()), found.shape.resize(size(), {Mat3{{}, {}, {}}, Mat3{{}, {}, {}}});
+    for (size_t row = 0; row < size(); ++row) {
+      if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) continue;
+      const std::vector<CentroidGradient> one = centroid_gradient(*overlap(row));
+      for (int i = 0; i < 2; ++i) found.pose[row][i] = one[i].pose, found.shape[row][i] = one[i].shape;
     }
     return found;
   });

@@ -30,6 +30,12 @@ struct DepthGradients {
   std::vector<ShapeGradients> shape;
 };
 
+/// The derivatives of centroids, a row per pair. Each has a block for a and one for b, and rows for coordinates.
+struct CentroidGradients {
+  std::vector<std::array<std::array<std::array<double, 6>, 3>, 2>> pose;
+  std::vector<std::array<Mat3, 2>> shape;
+};
+
 /// The second derivatives of the volume by the twelve numbers of BodyGradients.
 using PoseHessian = std::array<std::array<double, 12>, 12>;
 
@@ -80,6 +86,7 @@ struct Overlaps {
   const std::vector<double>& areas() const;
   const std::vector<ShapeGradients>& shape_gradients() const;
   const DepthGradients& depth_gradients() const;
+  const CentroidGradients& centroid_gradients() const;
   const std::vector<PoseHessian>& hessians() const;
   /// The patch of a row. It is seen along a unit direction if one is given.
   Patch patch(size_t row, const std::optional<Vec3>& direction = {}) const;
@@ -93,6 +100,7 @@ struct Overlaps {
   Shared<Patches> patches_ = std::make_shared<Once<Patches>>();
   Shared<std::vector<ShapeGradients>> shape_gradients_ = std::make_shared<Once<std::vector<ShapeGradients>>>();
   Shared<DepthGradients> depth_gradients_ = std::make_shared<Once<DepthGradients>>();
+  Shared<CentroidGradients> centroid_gradients_ = std::make_shared<Once<CentroidGradients>>();
   Shared<std::vector<PoseHessian>> hessians_ = std::make_shared<Once<std::vector<PoseHessian>>>();
 };
 

@@ -20,6 +20,7 @@ using namespace nb::literals;
 
 using Vector = nb::ndarray<nb::numpy, const double, nb::ndim<1>>;
 using Matrix = nb::ndarray<nb::numpy, const double, nb::ndim<2>>;
+using Matrices = nb::ndarray<nb::numpy, const double, nb::ndim<3>>;
 using Indices = nb::ndarray<nb::numpy, const int, nb::ndim<1>>;
 using IndexMatrix = nb::ndarray<nb::numpy, const int, nb::ndim<2>>;
 

@@ -292,6 +292,19 @@ overlapping. The first use takes some microseconds for each pair.)");
       },
       R"((p, 2, 3) derivatives of the depth by the sizes of a and of b, as Overlap.depth_shape_gradient; zeros unless
 overlapping.)");
+  const auto of_centroid = [](auto member) {
+    return [member](const Overlaps& overlaps) -> const auto& {
+      return unlocked([&]() -> const CentroidGradients& { return overlaps.centroid_gradients(); }).*member;
+    };
+  };
+  define_column<std::array<std::array<std::array<double, 6>, 3>, 2>>(
+      cls, "centroid_gradient", of_centroid(&CentroidGradients::pose),
+      R"((p, 2, 3, 6) derivatives of the centroid by the poses of a and of b, as Overlap.centroid_gradient; zeros unless
+overlapping. The first use takes some tens of microseconds for each pair of polyhedra.)");
+  define_column<std::array<Mat3, 2>>(
+      cls, "centroid_shape_gradient", of_centroid(&CentroidGradients::shape),
+      R"((p, 2, 3, 3) derivatives of the centroid by the sizes of a and of b, as Overlap.centroid_shape_gradient; zeros
+unless overlapping.)");
   define_column<PoseHessian>(
       cls, "hessian",
       [](const Overlaps& overlaps) -> const auto& {

@@ -4,6 +4,7 @@
 #include "distance/gjk.h"
 #include "distance/penetration.h"
 #include "methods/half_spaces_alone.h"
+#include "overlap/centroid_gradient.h"
 #include "overlap/depth_gradient.h"
 #include "overlap/overlap.h"
 #include "overlap/second_derivatives.h"
@@ -257,6 +258,31 @@ ValueError
     If there are three or more bodies, and one of them is round.)");
 }
 
+/// A (bodies, 3, columns) array of the derivatives of the centroid.
+template <class T>
+Matrices by_coordinates(const Overlap& o, T CentroidGradient::* part) {
+  std::vector<double> values;
+  for (const CentroidGradient& each : computed_of(o.bodies(), [&] { return centroid_gradient(o); })) {
+    const auto* first = reinterpret_cast<const double*>(&(each.*part));
+    values.insert(values.end(), first, first + sizeof(T) / sizeof(double));
+  }
+  return to_numpy<Matrices>(std::move(values), {o.bodies().size(), 3, sizeof(T) / sizeof(double) / 3});
+}
+
+void define_centroid_gradient(nb::class_<Overlap>& cls) {
+  array_property(
+      cls, "centroid_gradient", [](const Overlap& o) { return by_coordinates(o, &CentroidGradient::pose); },
+      R"((m, 3, 6) d centroid / d (translation, rotation vector about the body's own position) of each body, world axes. Row j of
+a body has the derivatives of coordinate j. 1 and m. The translations of all bodies add up to the identity. Where faces of two
+bodies lie in one plane, derivatives are one-sided, as those of `gradient`. NaN for groups of three or more bodies with a
+round body, and for pairs with a round body. Zeros unless overlapping.)");
+  array_property(
+      cls, "centroid_shape_gradient", [](const Overlap& o) { return by_coordinates(o, &CentroidGradient::shape); },
+      R"((m, 3, 3) d centroid / d (size) of each body, by the numbers of `shape_gradient`: half extents, radius and length, half
+axes, or the offset of a half-space, then zeros. Row j of a body has the derivatives of coordinate j. Without unit. NaN for
+hulls, and where `centroid_gradient` is NaN. Zeros unless overlapping.)");
+}
+
 void define_shape_gradient(nb::class_<Overlap>& cls) {
   array_property(
       cls, "shape_gradient",
@@ -502,6 +528,7 @@ quantities together; `errors.vertices` takes as long as `vertices`.)");
   define_measures(cls);
   define_shape_gradient(cls);
   define_hessian(cls);
+  define_centroid_gradient(cls);
   define_boundary(cls);
   define_contact(cls);
   cls.def("__repr__", [](const Overlap& o) { return repr(o); });
