@@ -108,6 +108,15 @@ def test_a_ball_in_a_half_space_has_a_closed_form(depth):
     assert_allclose(hessian[3:6, 3:6], 0, atol=1e-13)
 
 
+def test_shallow_sections_of_a_ball_keep_their_digits_in_any_direction():
+    rng, radius, depth = np.random.default_rng(1), 0.6, 1e-6
+    for turn in rng.normal(size=(40, 4)):
+        plane = Placed(HalfSpace((0.6, 0, 0.8), 0.1), (0, 0, 0), turn)
+        n = Rotation.from_quat(turn).apply([0.6, 0, 0.8])
+        hessian = overlap(Placed(Sphere(radius), n * (0.1 + radius - depth)), plane).hessian
+        assert_allclose(n @ hessian[:3, :3] @ n, 2 * np.pi * (radius - depth), rtol=1e-9)
+
+
 @pytest.mark.parametrize("tilt", [0, 1e-12, 1e-9, 1e-6, 1e-3])
 def test_a_cylinder_on_a_half_space_has_its_section_as_stiffness(tilt):
     radius, length, depth = 0.5, 2.0, 0.1

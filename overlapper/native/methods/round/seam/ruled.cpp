@@ -80,9 +80,11 @@ class Ruled {
       for (const int branch : {-1, 1}) {
         const auto at = [&, low = low, high = high](double angle) {
           const Line line = line_at(parameter(angle));
-          const double square = std::max(0.0, line.discriminant()), root = std::sqrt(square);
-          const Vec3 x = line.start + line.crossing(branch, root) * along_;
           const double rate = (high - low) / 2 * std::sin(angle);
+          const double square = fall_ > 0 ? fall_ * rate * rate : std::max(0.0, line.discriminant());
+          const double root = std::sqrt(square);
+          const Vec3 x = line.start + line.crossing(branch, root) * along_;
+          if (fall_ > 0) return SeamPoint{x, make(x), length_ / std::sqrt(fall_) / scale, 0};
           if (!(square > 0)) return SeamPoint{x, make(x), 0, 0};
           return SeamPoint{x, make(x), rate * length_ / root / scale, kBlur * line.terms / square};
         };
@@ -149,7 +151,42 @@ class Ruled {
     return found;
   }
 
+  /// In a plane, the discriminant is fall (p − low) (high − p). True if this is between the ends of the base.
+  bool find_ellipse() {
+    fall_ = 0;
+    if (cylinder_) return false;
+    const Polynomials of = polynomials(quadric_, base_);
+    const Fourth square = product(of.beta, of.beta);
+    const double d0 = square[0] - alpha_ * of.gamma[0], d1 = square[1] - alpha_ * of.gamma[1];
+    const double d2 = square[2] - alpha_ * of.gamma[2], under = d1 * d1 - 4 * d0 * d2;
+    if (!(d2 < 0 && under > 0)) return false;
+    const double far = -(d1 + std::copysign(std::sqrt(under), d1)), one = far / (2 * d2);
+    const double two = far != 0 ? 2 * d0 / far : 0, low = std::min(one, two), high = std::max(one, two);
+    if (!(low >= least() && high <= most())) return false;
+    intervals_.assign(1, {low, high}), fall_ = -d2;
+    return true;
+  }
+
+  /// Newton's method for the discriminant on a cylinder. Near the inner point, angles keep more digits than roots of
+  /// polynomials.
+  double polished(double p) const {
+    if (!cylinder_) return p;
+    constexpr double kNear = 1e-9;
+    for (int i = 0; i < 2; ++i) {
+      const Line line = line_at(p);
+      const Vec3 rate = std::cos(p) / 2 * base_[1] + std::sin(p) / 2 * (base_[2] - base_[0]);
+      const double slope =
+          2 * (line.beta * dot(k_along_, quadric_.k * rate) - alpha_ * dot(quadric_.gradient(line.start), rate));
+      const double step = -line.discriminant() / slope;
+      if (!(std::abs(step) < kNear)) break;
+      p += step;
+    }
+    return p;
+  }
+
   void find_intervals() {
+    tangent_ = false;
+    if (find_ellipse()) return;
     std::vector<double> ends;
     double whole = 0, terms = 0;
     for_charts([&](const std::array<Vec3, 3>& base, auto parameter) {
@@ -161,7 +198,7 @@ class Ruled {
         whole += std::abs(d[i]);
       }
       const lenses::Roots roots = lenses::roots<4>(d, -1, 1);
-      for (int i = 0; i < roots.count; ++i) ends.push_back(parameter(roots.t[i]));
+      for (int i = 0; i < roots.count; ++i) ends.push_back(polished(parameter(roots.t[i])));
     });
     tangent_ = whole <= 1e-14 * terms;
     intervals_.clear();
@@ -231,6 +268,7 @@ class Ruled {
   Second below_;  ///< the denominator
   Vec3 along_, k_along_;
   double alpha_ = 0, length_ = 1;  ///< m of the base per parameter, over the length of the ruled surface's normal
+  double fall_ = 0;                ///< of the discriminant on an ellipse in a plane; 0 for other lines
   bool tangent_ = false;
   std::vector<std::array<double, 2>> intervals_;  ///< of p, with crossings
   std::vector<double> changes_, steps_;
