@@ -1,12 +1,16 @@
 #include "overlap/centroid_gradient.h"
 
 #include "geometry/cancellation.h"
+#include "methods/round/seam/seam.h"
+#include "overlap/facet_sections.h"
+#include "overlap/revolved_surface.h"
 #include "overlap/shape_gradient.h"
 
 namespace overlapper {
 namespace {
 
 constexpr Mat3 kZeros{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+constexpr Vec3 kNoNumbers{kNoDerivative, kNoDerivative, kNoDerivative};
 
 /// Integrals over the part of the surface that a body owns. Places x are about the centroid, and n is the normal.
 struct SurfaceMoments {
@@ -34,8 +38,7 @@ CentroidGradient gradient_of(const SurfaceMoments& moments, Vec3 lever, double v
 CentroidGradient unknown() {
   CentroidGradient none;
   for (auto& row : none.pose) row.fill(kNoDerivative);
-  constexpr Vec3 kRow{kNoDerivative, kNoDerivative, kNoDerivative};
-  none.shape = {kRow, kRow, kRow};
+  none.shape = {kNoNumbers, kNoNumbers, kNoNumbers};
   return none;
 }
 
@@ -82,12 +85,139 @@ std::vector<CentroidGradient> of_polyhedra(const Overlap& overlap) {
   return found;
 }
 
+/// A pair with a round body. Places x are about the centroid.
+///
+/// The part of the surface that a body owns ends at the seam. The rays from the centroid to the seam and the part
+/// together are closed. On the rays, x · n is zero. Gauss's and Stokes' theorems therefore give
+/// ∫ x nᵀ dA = (d I + ∮ x (x × dx)ᵀ) / 3 and ∫ x_j x_k n dA = (m_j e_k + m_k e_j + ∮ x_j x_k x × dx) / 4,
+/// for d = ∫ x · n dA and m = ∫ x (x · n) dA. For both bodies together, d is three times the volume, and m is zero.
+/// Only one body therefore needs d and m.
+class RoundPair {
+ public:
+  explicit RoundPair(const Overlap& overlap)
+      : overlap_(overlap), bodies_(overlap.bodies()), centroid_(overlap.centroid()) {}
+
+  std::vector<CentroidGradient> found() {
+    const auto points = seam::seam_of(bodies_[0], bodies_[1], centroid_);
+    if (!points) return {unknown(), unknown()};
+    for (const seam::SeamPoint& point : *points) {
+      const Vec3 step = point.weight * cross(point.outward[0], point.outward[1]);
+      border_[0].push_back({point.place, step}), border_[1].push_back({point.place, -step});
+    }
+    add_seam();
+    for (const int i : {0, 1}) look_at(i);
+    if (known_ < 0) return {unknown(), unknown()};
+    complete(known_, sums_[known_]);
+    SurfaceSums rest;
+    rest.distance = 3 * overlap_.volume() - sums_[known_].distance, rest.moment = -sums_[known_].moment;
+    complete(1 - known_, rest);
+    std::vector<CentroidGradient> both;
+    for (const int i : {0, 1}) {
+      add_sizes(i);
+      both.push_back(gradient_of(moments_[i], centroid_ - bodies_[i].position, overlap_.volume()));
+    }
+    return both;
+  }
+
+ private:
+  void add_seam() {
+    for (const int i : {0, 1})
+      for (const BorderNode& node : border_[i]) {
+        const Vec3 x = node.place, turned = cross(x, node.step);
+        SurfaceMoments& sums = moments_[i];
+        sums.first = sums.first + outer(x / 3, turned);
+        for (int j = 0; j < 3; ++j) sums.second[j] = sums.second[j] + outer(x[j] / 4 * x, turned);
+      }
+  }
+
+  /// Finds the sums of a body by its own surface.
+  void look_at(int i) {
+    const Shape& shape = bodies_[i].shape;
+    SurfaceSums& sums = sums_[i];
+    if (!smooth(shape)) {
+      for (const FacetSection& face : facet_sections(overlap_, i, centroid_)) {
+        const double distance = dot(face.normal, face.first);
+        sums.distance += distance, sums.moment += distance / face.area * face.first;
+        if (!polytope_of(shape))
+          moments_[i].by_size = moments_[i].by_size + outer(face.first, speeds_of_facet(bodies_[i], face.normal));
+      }
+      known_ = i;
+    } else if (stretched(shape) || revolution(shape)) {
+      sums = revolved_surface(bodies_[i], bodies_[1 - i], centroid_, border_[i]);
+      if (known_ < 0 || simplicity(shape) > simplicity(bodies_[known_].shape)) known_ = i;
+    }
+  }
+
+  /// Faces have the smallest errors, and ends of cylinders the largest.
+  static int simplicity(const Shape& shape) {
+    if (!smooth(shape)) return 3;
+    const auto round = revolution(shape);
+    return !round || (round->round_ends && round->half_length == 0) ? 2 : round->round_ends ? 1 : 0;
+  }
+
+  void complete(int i, const SurfaceSums& sums) {
+    const double d = sums.distance / 3;
+    const Vec3 m = sums.moment / 4;
+    SurfaceMoments& of = moments_[i];
+    of.first = of.first + Mat3{{d, 0, 0}, {0, d, 0}, {0, 0, d}};
+    const std::array<Vec3, 3> axes{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+    for (int j = 0; j < 3; ++j) {
+      const Mat3 across{m[j] * axes[0], m[j] * axes[1], m[j] * axes[2]};
+      of.second[j] = of.second[j] + across + outer(m, axes[j]);
+    }
+  }
+
+  /// ∫ x_j n y dA along each own axis, for y about the body's position: columns by axes.
+  Mat3 stretching(int i) const {
+    const Mat3& rotation = bodies_[i].pose.rotation;
+    const Vec3 lever = apply_transposed(rotation, centroid_ - bodies_[i].position);
+    const std::array<Vec3, 3> first = rows(moments_[i].first);
+    std::array<Vec3, 3> found;
+    for (int j = 0; j < 3; ++j) {
+      const Mat3 second = transposed(rotation) * moments_[i].second[j] * rotation;
+      found[j] =
+          Vec3{second.row0.x, second.row1.y, second.row2.z} + scaled(lever, apply_transposed(rotation, first[j]));
+    }
+    return {found[0], found[1], found[2]};
+  }
+
+  void add_sizes(int i) {
+    const Shape& shape = bodies_[i].shape;
+    Mat3& by_size = moments_[i].by_size;
+    const auto by = [&](Vec3 one, Vec3 two) { by_size = transposed({one, two, {}}); };
+    const Mat3 along = transposed(stretching(i));
+    if (const Ellipsoid* ellipsoid = std::get_if<Ellipsoid>(&shape)) {
+      const Vec3 h = ellipsoid->half_axes;
+      by_size = transposed({along.row0 / h.x, along.row1 / h.y, along.row2 / h.z});
+    } else if (const Sphere* sphere = std::get_if<Sphere>(&shape)) {
+      by((along.row0 + along.row1 + along.row2) / sphere->radius, {});
+    } else if (const Cylinder* cylinder = std::get_if<Cylinder>(&shape)) {
+      by((along.row0 + along.row1) / cylinder->radius, along.row2 / cylinder->length);
+    } else if (const Capsule* capsule = std::get_if<Capsule>(&shape)) {
+      by(sums_[i].by_radius, capsule->length > 0 ? sums_[i].by_length : kNoNumbers);
+    } else if (std::holds_alternative<RoundedHull>(shape)) {
+      by(kNoNumbers, {});
+    } else if (polytope_of(shape)) {
+      by_size = {kNoNumbers, kNoNumbers, kNoNumbers};
+    }
+  }
+
+  const Overlap& overlap_;
+  std::span<const Placed> bodies_;
+  Vec3 centroid_;
+  std::array<std::vector<BorderNode>, 2> border_;
+  std::array<SurfaceMoments, 2> moments_;
+  std::array<SurfaceSums, 2> sums_;
+  int known_ = -1;  ///< the body whose sums count
+};
+
 }  // namespace
 
 std::vector<CentroidGradient> centroid_gradient(const Overlap& overlap) {
   const size_t bodies = overlap.bodies().size();
   if (overlap.status() != Status::kOverlapping) return std::vector<CentroidGradient>(bodies);
   if (polyhedral(overlap.bodies())) return of_polyhedra(overlap);
+  if (overlap.pair()) return RoundPair(overlap).found();
   return std::vector<CentroidGradient>(bodies, unknown());
 }
 

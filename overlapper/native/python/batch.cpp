@@ -300,7 +300,7 @@ overlapping.)");
   define_column<std::array<std::array<std::array<double, 6>, 3>, 2>>(
       cls, "centroid_gradient", of_centroid(&CentroidGradients::pose),
       R"((p, 2, 3, 6) derivatives of the centroid by the poses of a and of b, as Overlap.centroid_gradient; zeros unless
-overlapping. The first use takes some tens of microseconds for each pair of polyhedra.)");
+overlapping. The first use takes some tens of microseconds for each pair of polyhedra, and longer for round bodies.)");
   define_column<std::array<Mat3, 2>>(
       cls, "centroid_shape_gradient", of_centroid(&CentroidGradients::shape),
       R"((p, 2, 3, 3) derivatives of the centroid by the sizes of a and of b, as Overlap.centroid_shape_gradient; zeros

@@ -17,6 +17,7 @@ MAY_ASK_FOR_A_KIND = {
     "batch/shape_array.cpp",
     "distance/box_axes.cpp",
     "methods/clipping/wide_corners.cpp",
+    "overlap/centroid_gradient.cpp",
     "overlap/second_derivatives.cpp",
     "overlap/shape_gradient.cpp",
     "python/shape_arrays.cpp",

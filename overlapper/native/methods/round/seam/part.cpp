@@ -118,7 +118,8 @@ void Part::add(std::vector<SeamPoint>& points) {
   }
 }
 
-/// Adds the line in which two faces cross. Gauss's two nodes are exact for products of two linear functions.
+/// Adds the line in which two faces cross. Gauss's two nodes are exact for products of two linear functions. The end of
+/// a cylinder has more nodes, for functions that are not polynomials.
 void Part::add_ridge(int of_first, int of_second, std::vector<SeamPoint>& points) {
   const WideVector n = walls[of_first].normal, m = walls[of_second].normal, wide_across = cross(n, m);
   const Vec3 across = rounded(wide_across);
@@ -149,11 +150,18 @@ void Part::add_ridge(int of_first, int of_second, std::vector<SeamPoint>& points
     low = std::max(low, std::min(one, two)), high = std::min(high, std::max(one, two));
   }
   if (!(low < high) || !holds(origin + (low / 2 + high / 2) * along, {of_first, of_second})) return;
+  const auto at = [&](double far) {
+    return SeamPoint{origin + far * along, {faces_[of_first].normal, faces_[of_second].normal}, 1 / norm(across)};
+  };
+  if (round[0] || round[1]) {
+    Quadrature(at, points).add(low, high);
+    return;
+  }
   const double node = std::sqrt(1.0 / 12), length = high - low;
-  for (const double share : {0.5 - node, 0.5 + node})
-    points.push_back({origin + (low + share * length) * along,
-                      {faces_[of_first].normal, faces_[of_second].normal},
-                      length / 2 / norm(across)});
+  for (const double share : {0.5 - node, 0.5 + node}) {
+    points.push_back(at(low + share * length));
+    points.back().weight *= length / 2;
+  }
 }
 
 bool Part::coincide(const Quadric& a, const Quadric& b) const {
