@@ -1,9 +1,12 @@
 #include "overlap/centroid_gradient.h"
 
+#include <algorithm>
+
 #include "geometry/cancellation.h"
 #include "methods/round/seam/seam.h"
 #include "overlap/facet_sections.h"
 #include "overlap/revolved_surface.h"
+#include "overlap/rounded_surface.h"
 #include "overlap/shape_gradient.h"
 
 namespace overlapper {
@@ -98,15 +101,28 @@ class RoundPair {
       : overlap_(overlap), bodies_(overlap.bodies()), centroid_(overlap.centroid()) {}
 
   std::vector<CentroidGradient> found() {
-    const auto points = seam::seam_of(bodies_[0], bodies_[1], centroid_);
+    if (!std::ranges::all_of(bodies_, has_sums)) return {unknown(), unknown()};
+    std::array<std::vector<seam::SeamPoint>, 2> rims;
+    const auto points = seam::seam_of(bodies_[0], bodies_[1], centroid_, &rims);
     if (!points) return {unknown(), unknown()};
+    Vec3 gap;
+    double length = 0;
     for (const seam::SeamPoint& point : *points) {
-      const Vec3 step = point.weight * cross(point.outward[0], point.outward[1]);
-      border_[0].push_back({point.place, step}), border_[1].push_back({point.place, -step});
+      const auto& [n, m] = point.outward;
+      const Vec3 step = point.weight * cross(n, m);
+      border_[0].push_back({point.place, step, unit(n)}), border_[1].push_back({point.place, -step, unit(m)});
+      gap += step, length += norm(step);
     }
+    for (const int i : {0, 1})
+      for (const seam::SeamPoint& point : rims[i]) {
+        const auto& [n, m] = point.outward;
+        rims_[i].push_back({point.place, point.weight * cross(n, m), unit(n)});
+      }
+    // The seam is closed. If it is not, a part of it was lost.
+    constexpr double kMostGap = 1e-6;
+    if (!(norm(gap) <= kMostGap * length)) return {unknown(), unknown()};
     add_seam();
     for (const int i : {0, 1}) look_at(i);
-    if (known_ < 0) return {unknown(), unknown()};
     complete(known_, sums_[known_]);
     SurfaceSums rest;
     rest.distance = 3 * overlap_.volume() - sums_[known_].distance, rest.moment = -sums_[known_].moment;
@@ -120,6 +136,12 @@ class RoundPair {
   }
 
  private:
+  /// False for kinds of round bodies whose surface cannot be summed.
+  static bool has_sums(const Placed& body) {
+    const Shape& shape = body.shape;
+    return !smooth(shape) || stretched(shape) || revolution(shape) || polytope_of(shape);
+  }
+
   void add_seam() {
     for (const int i : {0, 1})
       for (const BorderNode& node : border_[i]) {
@@ -142,8 +164,10 @@ class RoundPair {
           moments_[i].by_size = moments_[i].by_size + outer(face.first, speeds_of_facet(bodies_[i], face.normal));
       }
       known_ = i;
-    } else if (stretched(shape) || revolution(shape)) {
-      sums = revolved_surface(bodies_[i], bodies_[1 - i], centroid_, border_[i]);
+    } else {
+      const bool rounded_hull = std::holds_alternative<RoundedHull>(shape);
+      sums = rounded_hull ? rounded_surface(overlap_, i, centroid_, border_[i], rims_[i])
+                          : revolved_surface(bodies_[i], bodies_[1 - i], centroid_, border_[i]);
       if (known_ < 0 || simplicity(shape) > simplicity(bodies_[known_].shape)) known_ = i;
     }
   }
@@ -151,6 +175,7 @@ class RoundPair {
   /// Faces have the smallest errors, and ends of cylinders the largest.
   static int simplicity(const Shape& shape) {
     if (!smooth(shape)) return 3;
+    if (std::holds_alternative<RoundedHull>(shape)) return -1;
     const auto round = revolution(shape);
     return !round || (round->round_ends && round->half_length == 0) ? 2 : round->round_ends ? 1 : 0;
   }
@@ -196,7 +221,7 @@ class RoundPair {
     } else if (const Capsule* capsule = std::get_if<Capsule>(&shape)) {
       by(sums_[i].by_radius, capsule->length > 0 ? sums_[i].by_length : kNoNumbers);
     } else if (std::holds_alternative<RoundedHull>(shape)) {
-      by(kNoNumbers, {});
+      by(sums_[i].by_radius, {});
     } else if (polytope_of(shape)) {
       by_size = {kNoNumbers, kNoNumbers, kNoNumbers};
     }
@@ -205,7 +230,7 @@ class RoundPair {
   const Overlap& overlap_;
   std::span<const Placed> bodies_;
   Vec3 centroid_;
-  std::array<std::vector<BorderNode>, 2> border_;
+  std::array<std::vector<BorderNode>, 2> border_, rims_;
   std::array<SurfaceMoments, 2> moments_;
   std::array<SurfaceSums, 2> sums_;
   int known_ = -1;  ///< the body whose sums count

@@ -13,8 +13,8 @@ struct CentroidGradient {
   Mat3 shape{{}, {}, {}};                       ///< by the numbers of shape_gradient(); NaN for hulls
 };
 
-/// One for each body. Zeros unless overlapping. NaN for groups with a round body, for two rounded hulls, and for a pair
-/// with a round body whose surfaces coincide or touch along a line. The radius of a rounded hull has none.
+/// One for each body. Zeros unless overlapping. NaN for groups with a round body, and for a pair with a round body
+/// whose surfaces coincide or touch along a line. NaN also if rounding has lost a part of the seam.
 ///
 /// If the surface that a body owns moves out at the speed s, the volume V and the centroid C change by
 /// V dC = ∫ (x - C) s dA. The speed of a twist v is v(x) · n. It is linear in x, so moments of the surface up to the

@@ -26,7 +26,7 @@ class RevolvedSurface {
       radius_ = of.radius, half_length_ = of.half_length, round_ends_ = of.round_ends;
     }
     inside_ = own(inside - body.position);
-    for (const BorderNode& node : border) border_.push_back({inside_ + own(node.place), own(node.step)});
+    for (const BorderNode& node : border) border_.push_back({inside_ + own(node.place), own(node.step), {}});
   }
 
   SurfaceSums sums() {

@@ -8,8 +8,9 @@ namespace overlapper {
 
 /// A node of a quadrature along the border of a surface. Seen from outside, the surface is on the left of `step`.
 struct BorderNode {
-  Vec3 place;  ///< about the inner point
-  Vec3 step;   ///< m: the tangent times the weight
+  Vec3 place;   ///< about the inner point
+  Vec3 step;    ///< m: the tangent times the weight
+  Vec3 normal;  ///< unit, of the surface
 };
 
 /// Integrals over the part of a body's surface within another body. Places x are about the inner point, and n is the

@@ -275,13 +275,13 @@ void define_centroid_gradient(nb::class_<Overlap>& cls) {
       R"((m, 3, 6) d centroid / d (translation, rotation vector about the body's own position) of each body, world axes. Row j of
 a body has the derivatives of coordinate j. 1 and m. The translations of all bodies add up to the identity. Where faces of
 boxes, hulls and half-spaces lie in one plane, derivatives are one-sided, as those of `gradient`. NaN for a pair with a round
-body if surfaces coincide, or touch along a line. NaN also for two rounded hulls, and for three or more bodies with a round
-body. Zeros unless overlapping.)");
+body if surfaces coincide, or touch along a line, and for contacts so shallow that rounding hides where surfaces cross. NaN also
+for three or more bodies with a round body. Zeros unless overlapping.)");
   array_property(
       cls, "centroid_shape_gradient", [](const Overlap& o) { return by_coordinates(o, &CentroidGradient::shape); },
       R"((m, 3, 3) d centroid / d (size) of each body, by the numbers of `shape_gradient`: half extents, radius and length, half
 axes, or the offset of a half-space, then zeros. Row j of a body has the derivatives of coordinate j. Without unit. NaN for
-hulls, for the radius of a rounded hull, for the length 0 of a capsule, and where `centroid_gradient` is NaN. Zeros unless
+hulls, for the length 0 of a capsule, and where `centroid_gradient` is NaN. Zeros unless
 overlapping.)");
 }
 

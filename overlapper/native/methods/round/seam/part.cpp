@@ -81,7 +81,18 @@ const Quadric* Part::beside(Sides sides) const {
   if (sides[0] == kRound && sides[1] == kRound) return nullptr;
   if (sides[0] != kRound && sides[1] != kRound) return nullptr;
   const int face = sides[0] == kRound ? sides[1] : sides[0];
-  return round[faces_[face].owner];
+  return round[rim_of_ >= 0 ? 1 - rim_of_ : faces_[face].owner];
+}
+
+void Part::add_rims(int body, size_t first, size_t last, std::vector<SeamPoint>& points) {
+  const Quadric* own = round[body];
+  if (!own || !own->cylinder) return;
+  constexpr double kAcross = 0.5;  // cuts contain the axis or are orthogonal to it
+  rim_of_ = body;
+  for (size_t i = first; i < last; ++i)
+    if (faces_[i].owner == slicing::kCut && std::abs(dot(faces_[i].normal, own->axis)) > kAcross)
+      add_section(*this, static_cast<int>(i), *own, points);
+  rim_of_ = -1;
 }
 
 void Part::add(std::vector<SeamPoint>& points) {

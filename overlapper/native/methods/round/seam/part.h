@@ -57,12 +57,16 @@ class Part {
   const Quadric* beside(Sides sides) const;
   void touch() { touching_ = true; }
 
+  /// Adds the arcs in which the cylinder of a body ends at cuts. The body has the walls from one number to the other.
+  void add_rims(int body, size_t first, size_t last, std::vector<SeamPoint>& points);
+
  private:
   void add_ridge(int of_first, int of_second, std::vector<SeamPoint>& points);
   bool coincide(const Quadric& a, const Quadric& b) const;
   bool anything() const;
 
   std::vector<Face> faces_;
+  int rim_of_ = -1;                        ///< the body, while its arcs are added
   std::vector<std::array<int, 2>> flush_;  ///< faces of both bodies in one plane
   bool touching_ = false;
 };

@@ -30,7 +30,8 @@ std::vector<Quadric> quadrics_of(const Placed& body, const pieces::Pieces& of, V
 
 }  // namespace
 
-std::optional<std::vector<SeamPoint>> seam_of(const Placed& a, const Placed& b, Vec3 inside) {
+std::optional<std::vector<SeamPoint>> seam_of(const Placed& a, const Placed& b, Vec3 inside,
+                                              std::array<std::vector<SeamPoint>, 2>* rims) {
   const Scratch<BothPieces> both;
   auto& [of, common, culling, near] = *both;
   of[0].clear(), of[1].clear(), near.clear();
@@ -54,6 +55,7 @@ std::optional<std::vector<SeamPoint>> seam_of(const Placed& a, const Placed& b, 
   for (const auto& numbers : near) {
     cancellation_point();
     part.walls.clear();
+    std::array<size_t, 2> counts{of[0].of(numbers[0]).size(), of[1].of(numbers[1]).size()};
     for (const int i : {0, 1}) {
       const int round = of[i].pieces[numbers[i]].round;
       part.round[i] = round < 0 ? nullptr : &quadrics[i][round];
@@ -63,8 +65,13 @@ std::optional<std::vector<SeamPoint>> seam_of(const Placed& a, const Placed& b, 
     if (culled) {
       if (!culling.meet(numbers[0], numbers[1], meeting)) continue;
       part.walls = meeting.walls;
+      counts = {meeting.of_p.size(), meeting.of_q.size()};
     }
     part.add(points);
+    if (rims) {
+      part.add_rims(0, 0, counts[0], (*rims)[0]);
+      part.add_rims(1, counts[0], counts[0] + counts[1], (*rims)[1]);
+    }
     if (part.touching()) return std::nullopt;
   }
   return points;

@@ -25,6 +25,10 @@ struct SeamPoint {
 /// the crossings of quadrics in the same way. Two ellipsoids have no such surface. Their lines are followed.
 ///
 /// No value if surfaces of both bodies coincide, or touch along a line.
-std::optional<std::vector<SeamPoint>> seam_of(const Placed& a, const Placed& b, Vec3 inside);
+///
+/// `rims`, if not null, gets the arcs in which the cylinders of a rounded hull end, for each body within the other one.
+/// The first normal is the cylinder's, and the second one points along the axis out of the cylinder.
+std::optional<std::vector<SeamPoint>> seam_of(const Placed& a, const Placed& b, Vec3 inside,
+                                              std::array<std::vector<SeamPoint>, 2>* rims = nullptr);
 
 }  // namespace overlapper::seam
