@@ -105,22 +105,16 @@ class RoundPair {
     std::array<std::vector<seam::SeamPoint>, 2> rims;
     const auto points = seam::seam_of(bodies_[0], bodies_[1], centroid_, &rims);
     if (!points) return {unknown(), unknown()};
-    Vec3 gap;
-    double length = 0;
     for (const seam::SeamPoint& point : *points) {
       const auto& [n, m] = point.outward;
       const Vec3 step = point.weight * cross(n, m);
       border_[0].push_back({point.place, step, unit(n)}), border_[1].push_back({point.place, -step, unit(m)});
-      gap += step, length += norm(step);
     }
     for (const int i : {0, 1})
       for (const seam::SeamPoint& point : rims[i]) {
         const auto& [n, m] = point.outward;
         rims_[i].push_back({point.place, point.weight * cross(n, m), unit(n)});
       }
-    // The seam is closed. If it is not, a part of it was lost.
-    constexpr double kMostGap = 1e-6;
-    if (!(norm(gap) <= kMostGap * length)) return {unknown(), unknown()};
     add_seam();
     for (const int i : {0, 1}) look_at(i);
     complete(known_, sums_[known_]);

@@ -28,6 +28,18 @@ std::vector<Quadric> quadrics_of(const Placed& body, const pieces::Pieces& of, V
   return found;
 }
 
+/// False if a part of the lines is missing.
+bool closed(std::span<const SeamPoint> points) {
+  constexpr double kMostGap = 1e-4;
+  Vec3 gap;
+  double length = 0;
+  for (const SeamPoint& point : points) {
+    const Vec3 step = point.weight * cross(point.outward[0], point.outward[1]);
+    gap += step, length += norm(step);
+  }
+  return norm(gap) <= kMostGap * length;
+}
+
 }  // namespace
 
 std::optional<std::vector<SeamPoint>> seam_of(const Placed& a, const Placed& b, Vec3 inside,
@@ -74,6 +86,7 @@ std::optional<std::vector<SeamPoint>> seam_of(const Placed& a, const Placed& b, 
     }
     if (part.touching()) return std::nullopt;
   }
+  if (!closed(points)) return std::nullopt;
   return points;
 }
 

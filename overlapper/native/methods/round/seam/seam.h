@@ -24,7 +24,7 @@ struct SeamPoint {
 /// quadric has two branches over a parameter, as the surface consists of parallel straight lines. Levin (1976) finds
 /// the crossings of quadrics in the same way. Two ellipsoids have no such surface. Their lines are followed.
 ///
-/// No value if surfaces of both bodies coincide, or touch along a line.
+/// No value if surfaces of both bodies coincide, or touch along a line, or if a part of the seam was not found.
 ///
 /// `rims`, if not null, gets the arcs in which the cylinders of a rounded hull end, for each body within the other one.
 /// The first normal is the cylinder's, and the second one points along the axis out of the cylinder.
