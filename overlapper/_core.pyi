@@ -1629,17 +1629,20 @@ class ContactSolver:
         `duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.
         """
 
-    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: Sequence[Any] | None = None) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int, float]:
+    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: Sequence[Any] | None = None, motors: numpy.typing.ArrayLike | None = None) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int, float]:
         """
         The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
-        without the patches. Rows that are `damped` choose stability over energy; without the argument, no row does. `ahead` has
-        a pair for each link: the position of its centre of mass after the step, in m, if the coordinates keep their velocity,
-        and the quaternion xyzw of its rotation until then. The trees of a simulator need it if there are patches.
+        without the patches and the motors. Rows that are `damped` choose stability over energy; without the argument, no row
+        does. `ahead` has a pair for each link: the position of its centre of mass after the step, in m, if the coordinates keep
+        their velocity, and the quaternion xyzw of its rotation until then. The trees of a simulator need it if there are
+        patches. `motors` (m, 4) are rows of a coordinate, a target, a gain from 0 to 1 and the largest force. A motor alone
+        changes the velocity v that its coordinate would have without it to (1 - gain) v + target. Motors of the trees of a
+        simulator do nothing.
 
         (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
-        last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and
-        how often the patches were gone through, and the largest change of a slip in the last time, as a fraction of the largest
-        slip.
+        last known, (n, 6) force and torque on the links about their centres of mass, the part of patches and motors in the
+        acceleration, and how often the patches were gone through, and the largest change of a slip in the last time, as a
+        fraction of the largest slip.
         """
 
 def function(core: Any) -> Any:

@@ -14,16 +14,16 @@ from overlapper.simulation.model import Array, LinkKey
 
 
 class OtherForces(Protocol):
-    """The accelerations of all coordinates by everything except contacts: gravity, motors, constraints."""
+    """The accelerations of all coordinates by everything except contacts and known motors, such as gravity."""
 
     def ahead(self, velocity: Array, duration: float) -> Array:
         """Return the velocity after a duration (s), if it keeps changing as it does now."""
 
     def learnt(self, velocity: Array) -> Array:
-        """Return the acceleration by everything except contacts, now that the coordinates have this velocity."""
+        """Return the acceleration by other forces, now that the coordinates have this velocity."""
 
     def solved(self, velocity: Array, duration: float, ours: Array) -> None:
-        """Record that from this velocity on, contacts accelerate the coordinates by `ours` for a duration (s)."""
+        """Record that from this velocity on, contacts and known motors accelerate by `ours` for a duration (s)."""
 
     def left_at(self, velocity: Array) -> None:
         """Record that a step has ended with this velocity."""
@@ -76,6 +76,13 @@ class Dynamics(Protocol):
         """For each link: its centre of mass after a duration (s) at this velocity, and its rotation until then.
 
         None if the solver finds them itself.
+        """
+
+    def motors(self, length: float, share: float) -> Array | None:
+        """(m, 4) the motors whose forces depend on the contacts, as `ContactSolver.solve` takes them. None: no motors.
+
+        They are those of a step of `length` (s), at the coordinates of the last `velocity`. The length is a `share` of
+        the simulation's time step.
         """
 
     def apply(self, wrenches: Array, frames: Sequence[Pose]) -> None:

@@ -176,7 +176,7 @@ STANDING = (0.0, 0.9, -1.8) * 4
     ],
 )
 def test_forces_on_a_robot_that_lands_are_settled_in_every_substep(client, file, height, turn, angles):
-    """Solved again at one pose, they are the same to 1e-8 of the largest."""
+    """Solved again at one pose twelve times, they are the same to 1e-7 of the largest."""
     p.setGravity(0, 0, -G, physicsClientId=client)
     p.loadURDF("plane.urdf", physicsClientId=client)
     robot = p.loadURDF(file, [0, 0, height], turn, physicsClientId=client)
@@ -196,4 +196,4 @@ def test_forces_on_a_robot_that_lands_are_settled_in_every_substep(client, file,
         assert len(first) >= 2
         for _ in range(12):
             again = contact.forces()
-            assert again.force == pytest.approx(first.force, rel=0, abs=1e-8 * np.abs(first.force).max())
+            assert again.force == pytest.approx(first.force, rel=0, abs=1e-7 * np.abs(first.force).max())

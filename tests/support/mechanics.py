@@ -3,7 +3,7 @@ a patch is four springs, and laws are looked at where the solver ends."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -234,6 +234,7 @@ class Scene:
     acceleration: Any = 0.0
     damped: bool = False
     distributed: bool = False
+    motors: Any = None  # rows of coordinate, target, gain and limit
     rounds: int = 1  # how often it is solved, each time from the answer before
     solver: _core.ContactSolver = field(init=False)
     frequency2: np.ndarray = field(init=False)
@@ -256,7 +257,9 @@ class Scene:
     def solve(self) -> Solution:
         damped = np.full(len(self.pairs), self.damped)
         for _ in range(self.rounds):
-            told = self.solver.solve(self.duration, self.velocity, self.acceleration, damped, self.distributed)
+            told = self.solver.solve(
+                self.duration, self.velocity, self.acceleration, damped, self.distributed, motors=self.motors
+            )
         return Solution(self, *told)
 
     def patches(self) -> list[Patch]:
@@ -324,6 +327,7 @@ def broken_laws(found: Solution, tolerance: float = 1e-8, staying: float = 0) ->
     fastest = float(np.abs(scene.velocity).max() + scene.duration * np.abs(scene.acceleration).max())
     jacobians = [links.jacobian(i, links.positions[i]) for i in range(len(links.links))]
     moved = inverse @ sum(rows.T @ wrench for rows, wrench in zip(jacobians, found.on_links, strict=True))
+    moved, answers = driven(found, moved, inverse, ask)
     ask("acceleration", found.acceleration, moved, float(np.abs(moved).max()))
     on_links = np.zeros_like(found.on_links)
     swings: dict[int, float] = {}
@@ -343,7 +347,7 @@ def broken_laws(found: Solution, tolerance: float = 1e-8, staying: float = 0) ->
         if patch.directed:
             ask("normal", normal, patch.normal, 1e-4)
         rows = scene.jacobian(pair, patch.found.centroid)
-        mobility = rows @ inverse @ rows.T
+        mobility = rows @ answers @ rows.T
         before, after = rows @ scene.velocity, rows @ found.velocity
         speed = fastest + scene.duration * size * float(np.abs(mobility).max())
         along = np.eye(3) - np.outer(normal, normal)
@@ -363,7 +367,11 @@ def broken_laws(found: Solution, tolerance: float = 1e-8, staying: float = 0) ->
             np.eye(6) - scene.duration * springs @ normal_part @ mobility @ normal_part, begin + springs @ free
         )
         scale = max(size, float(np.abs(asked).max()))
-        swing = np.linalg.eigvals(-springs / (lead + patch.dissipation) @ mobility).real.max() if patch.directed else 0
+        swing = (
+            np.linalg.eigvals(-springs / (lead + patch.dissipation) @ (rows @ inverse @ rows.T)).real.max()
+            if patch.directed
+            else 0
+        )
         for base in {links.base_of[scene.on[shape]] for shape in pair}:
             swings[base] = swings.get(base, 0.0) + max(0.0, swing)
         on_patch, at = patch.within_reach(asked) if patch.directed else (True, np.zeros(3))
@@ -403,6 +411,34 @@ def broken_laws(found: Solution, tolerance: float = 1e-8, staying: float = 0) ->
 
     ask("frequency", scene.frequency2, highest_swings(scene, swings), max(swings.values(), default=0.0))
     return complaints
+
+
+def driven(
+    found: Solution, moved: np.ndarray, inverse: np.ndarray, ask: Callable[[str, Any, Any, float], None]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ask for the laws of motors, beside what patches have `moved`.
+
+    Returns the acceleration by patches and motors, and the answer of coordinates with motors to forces.
+    """
+    scene, h = found.scene, found.scene.duration
+    if scene.motors is None:
+        return moved, inverse
+    coordinates, targets, gains, limits = np.array(scene.motors, dtype=float).T
+    which, gains = coordinates.astype(int), np.maximum(gains, 1e-6)
+    mobility = inverse[np.ix_(which, which)]
+    missing = (found.acceleration - moved)[which]
+    pushes = np.linalg.solve(mobility, missing)
+    # A motor alone would change a velocity v without it to (1 - gain) v + target.
+    wished = (targets - gains * found.velocity[which]) / np.diag(mobility) / h
+    soft, scale = 1 - gains, float(np.abs(pushes).max() + np.abs(limits).min())
+    full = np.abs(pushes) > limits * (1 - 1e-6)
+    ask("motors within their limits", np.maximum(np.abs(pushes) - limits, 0), 0, scale)
+    ask("motors that suffice", (wished - soft * pushes)[~full], 0, float(np.abs(wished).max() + scale))
+    ask("motors at their limits", np.minimum(np.sign(pushes) * (wished - soft * pushes), 0)[full], 0, scale)
+    held, gain = which[~full], gains[~full]
+    own = inverse[np.ix_(held, held)]
+    stiff = np.linalg.inv(own + np.diag(np.diag(own) * (1 - gain) / gain))
+    return moved + inverse[:, which] @ pushes, inverse - inverse[:, held] @ stiff @ inverse[held]
 
 
 def highest_swings(scene: Scene, swings: dict[int, float]) -> list[float]:

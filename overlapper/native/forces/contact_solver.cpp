@@ -37,6 +37,10 @@ constexpr int kWork = 60000;
 /// The most steps of Newton's method between two sweeps. If they are not enough, what they did is undone.
 constexpr int kSteps = 12;
 
+/// After so many solutions of a step, motors change from holding to their largest force only. Otherwise they may go
+/// around in circles, because forces of several feet that stick are not unique.
+constexpr int kRounds = 4;
+
 /// How much sticking forces give way at first, and in the end.
 constexpr double kGive = 1e-2, kLeastGive = 1e-9;
 /// Groups with more coordinates keep how they share sticking forces: to share them anew takes many steps.
@@ -98,20 +102,19 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
     mobilities_[i] = {m[0], {{m[21], m[22], m[23]}, {m[27], m[28], m[29]}, {m[33], m[34], m[35]}}};
   }
   patches_ = std::move(patches);
-  rows_.clear(), pool_.clear();
-  rows_.reserve(patches_.size());
-  std::vector<double> of_body(bodies_.bodies().size());
-  for (ElasticPatch& patch : patches_) {
-    // A patch without a direction is pushed in its last direction.
+  // A patch without a direction is pushed in its last direction.
+  for (ElasticPatch& patch : patches_)
     if (const Known* last = patch.area > 0 ? nullptr : known(patch.key)) patch.normal = last->normal;
-    Row& row = rows_.emplace_back(patch);
-    add_sides(row, patch);
+  make_rows();
+  std::vector<double> of_body(bodies_.bodies().size());
+  for (size_t i = 0; i < patches_.size(); ++i) {
+    const ElasticPatch& patch = patches_[i];
+    const Row& row = rows_[i];
     const double swing = largest_eigenvalue(row.area.foundation(patch.stiffness), row.normal_by_normal);
     const int a = bodies_.body_of(patch.link_a), b = bodies_.body_of(patch.link_b);
     of_body[a] += swing;
     if (a != b) of_body[b] += swing;
   }
-  share_damping();
   std::vector<double> frequency2;
   frequency2.reserve(patches_.size());
   for (const ElasticPatch& patch : patches_) {
@@ -121,6 +124,13 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
     frequency2.push_back(highest);
   }
   return frequency2;
+}
+
+void ContactSolver::make_rows() {
+  rows_.clear(), pool_.clear();
+  rows_.reserve(patches_.size());
+  for (const ElasticPatch& patch : patches_) add_sides(rows_.emplace_back(patch), patch);
+  share_damping();
 }
 
 /// Finds the damping along the normals by `recovery`. The patches of two links are damped as one patch, as far as they
@@ -771,10 +781,81 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
 }
 
 ContactSolver::Solution ContactSolver::solve(const Step& step) {
+  std::vector<double> velocity(step.velocity.begin(), step.velocity.end());
+  for (size_t i = 0; i < velocity.size(); ++i) velocity[i] += step.duration * step.acceleration[i];
+  return step.motors.empty() ? solve_patches(step, std::move(velocity)) : solve_with_motors(step, std::move(velocity));
+}
+
+/// Which motors push with their largest force is taken to be as in the last step at first. It is found anew until it
+/// agrees with the forces of the patches.
+ContactSolver::Solution ContactSolver::solve_with_motors(const Step& step, std::vector<double> velocity) {
+  const double h = step.duration;
+  full_.resize(velocity.size());
+  std::map<int, std::vector<Motor>> of_bodies;
+  const std::span<const Multibodies::Body> bodies = bodies_.bodies();
+  for (Motor motor : step.motors) {
+    const auto after = std::ranges::upper_bound(bodies, motor.coordinate, {}, &Multibodies::Body::first_coordinate);
+    const int number = int(after - bodies.begin()) - 1;
+    motor.coordinate -= bodies[number].first_coordinate;
+    if (!bodies_.mass(number).empty()) of_bodies[number].push_back(motor);
+  }
+  std::map<int, std::vector<double>> without;  // motors: the inverse mass matrices
+  Solution solution;
+  bool changed = true;
+  for (int round = 0; changed; ++round) {
+    std::vector<std::pair<int, MotorsOfBody>> driven;
+    std::vector<double> start = velocity;
+    for (const auto& [number, motors] : of_bodies) {
+      const Multibodies::Body& body = bodies[number];
+      const size_t first = body.first_coordinate, n = body.coordinates;
+      const std::span<const double> free(&velocity[first], n);
+      driven.emplace_back(number, MotorsOfBody(motors, bodies_.mass(number), free, h, std::span(&full_[first], n)));
+      const MotorsOfBody& of = driven.back().second;
+      std::ranges::copy(of.velocity(), &start[first]);
+      std::vector<double> before = bodies_.exchange_inverse_mass(number, of.inverse_mass());
+      if (round == 0) without[number] = std::move(before);
+    }
+    make_rows();
+    solution = solve_patches(step, start);
+    changed = false;
+    for (auto& [number, of] : driven) {
+      const Multibodies::Body& body = bodies[number];
+      const size_t first = body.first_coordinate, n = body.coordinates;
+      std::vector<double> end(n), impulses = forces_on_coordinates(number, solution);
+      for (size_t c = 0; c < n; ++c) {
+        end[c] = start[first + c] + h * solution.acceleration[first + c];
+        impulses[c] *= h;
+        solution.acceleration[first + c] = (end[c] - velocity[first + c]) / h;
+      }
+      changed = of.changes(end, impulses, round >= kRounds) || changed;
+    }
+  }
+  for (auto& [number, inverse_mass] : without) bodies_.exchange_inverse_mass(number, std::move(inverse_mass));
+  make_rows();
+  return solution;
+}
+
+/// The forces on the coordinates of a body with joints by the patches.
+std::vector<double> ContactSolver::forces_on_coordinates(int number, const Solution& solution) const {
+  std::vector<double> forces(bodies_.bodies()[number].coordinates);
+  const size_t n = forces.size();
+  for (size_t i = 0; i < rows_.size(); ++i) {
+    const Row& row = rows_[i];
+    const Six wrench = row.local({solution.patches[i].force, solution.patches[i].torque});
+    for (int s = 0; s < row.sides_used; ++s) {
+      if (row.sides[s].body != number) continue;
+      const double* rows = &pool_[row.sides[s].rows];
+      for (size_t k = 0; k < 3; ++k)
+        for (size_t c = 0; c < n; ++c)
+          forces[c] += rows[k * n + c] * wrench.normal[k] + rows[(k + 3) * n + c] * wrench.tangential[k];
+    }
+  }
+  return forces;
+}
+
+ContactSolver::Solution ContactSolver::solve_patches(const Step& step, std::vector<double> velocity) {
   const double h = step.duration;
   const int count = int(rows_.size());
-  std::vector<double> velocity(step.velocity.begin(), step.velocity.end());
-  for (size_t i = 0; i < velocity.size(); ++i) velocity[i] += h * step.acceleration[i];
   std::vector<MovedOn> found;
   if (step.ahead.empty() && count > 0) found = bodies_.ahead(h, step.velocity);
   const std::span<const MovedOn> ahead = step.ahead.empty() ? std::span<const MovedOn>(found) : step.ahead;

@@ -7,6 +7,7 @@
 
 #include "forces/elastic_patch.h"
 #include "forces/friction.h"
+#include "forces/motor.h"
 #include "forces/multibody.h"
 #include "forces/pressure.h"
 #include "forces/three.h"
@@ -48,18 +49,21 @@ class ContactSolver {
   struct Step {
     double duration;                       ///< s
     std::span<const double> velocity;      ///< of all coordinates, at the beginning
-    std::span<const double> acceleration;  ///< without the patches
+    std::span<const double> acceleration;  ///< without the patches and the motors
     std::span<const char> damped;          ///< per patch: whether to choose stability over energy (backward Euler)
     Friction friction = Friction::kEllipsoid;
     std::span<const MovedOn> ahead;  ///< the links at the end, with that velocity; found here for bodies with links
+    std::span<const Motor> motors;   ///< only of bodies with links
   };
 
   struct Solution {
     std::vector<PatchForce> patches;
     std::vector<std::array<Vec3, 2>> links;  ///< force and torque on each link, about its centre of mass
-    std::vector<double> acceleration;        ///< of all coordinates, by the patches
+    std::vector<double> acceleration;        ///< of all coordinates, by the patches and the motors
     int sweeps = 0;
-    double residual = 0;  ///< the largest change of a slip in the last sweep, over the largest slip without forces
+    /// The largest change of a slip in the last sweep, over the largest slip without forces. At least 1 if some motors
+    /// do not agree with the patches.
+    double residual = 0;
   };
 
   /// Solves a step with the patches as they were placed.
@@ -146,6 +150,7 @@ class ContactSolver {
 
   class Newton;
 
+  void make_rows();
   void add_sides(Row& row, const ElasticPatch& patch);
   void share_damping();
   void find_relative_damping(const Island& island, std::span<const double> velocity, std::span<Laws> laws) const;
@@ -164,6 +169,9 @@ class ContactSolver {
   double staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const;
   Drift drift(size_t patch, const Step& step, std::span<const MovedOn> ahead) const;
   Pressure::Damping damping(size_t patch, std::span<const Six> before, std::span<const Drift> drifts) const;
+  Solution solve_with_motors(const Step& step, std::vector<double> velocity);
+  Solution solve_patches(const Step& step, std::vector<double> velocity);
+  std::vector<double> forces_on_coordinates(int body, const Solution& solution) const;
   double visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const;
   Solution solved(std::span<const Laws> laws, std::span<const double> velocity) const;
   void remember(const Solution& solution, std::span<const Laws> laws, double duration);
@@ -183,6 +191,7 @@ class ContactSolver {
   std::vector<double> pool_;
   std::vector<Mobility> mobilities_;  ///< per body
   std::vector<Known> known_;          ///< of the last step, sorted by key
+  std::vector<signed char> full_;     ///< per coordinate, see MotorsOfBody
 };
 
 }  // namespace overlapper

@@ -37,8 +37,9 @@ Mat3 rotation_by(Vec3 vector) {
           {v.z * a.x - s.y, v.z * a.y + s.x, 1 - v.x * a.x - v.y * a.y}};
 }
 
-/// Inverts the symmetric matrix in place by Cholesky's method. A coordinate without mass does not move.
-void invert(std::vector<double>& m, int n) {
+}  // namespace
+
+void invert_mass(std::vector<double>& m, int n) {
   const auto at = [&](int i, int j) -> double& { return m[size_t(i) * n + j]; };
   double largest = 0;
   for (int i = 0; i < n; ++i) largest = std::max(largest, at(i, i));
@@ -73,8 +74,6 @@ void invert(std::vector<double>& m, int n) {
   }
   m = std::move(inverse);
 }
-
-}  // namespace
 
 Multibodies::Multibodies(std::vector<TreeLink> links) : links_(std::move(links)) {
   for (int i = 0; i < int(links_.size()); ++i) {
@@ -119,6 +118,7 @@ void Multibodies::make_room() {
   frames_.resize(links_.size());
   motions_.resize(coordinates_);
   for (const Body& body : bodies_) inverse_mass_.emplace_back(size_t(body.coordinates) * body.coordinates);
+  mass_.resize(bodies_.size());
 }
 
 void Multibodies::move(std::vector<Motion> motions, std::span<const double> inverse_mass, int width) {
@@ -256,19 +256,11 @@ void Multibodies::find_inverse_mass(int number) {
         for (int b : columns) m[size_t(a) * n + b] += left * rows[size_t(r) * n + b];
       }
   }
-  if (!(links_[body.first_link].mass > 0)) {
-    // The base is held, so the mass matrix of the joints is inverted alone.
-    const int joints = n - kOfBase;
-    std::vector<double> own(size_t(joints) * joints);
-    for (int i = 0; i < joints; ++i)
-      for (int j = 0; j < joints; ++j) own[size_t(i) * joints + j] = m[size_t(i + kOfBase) * n + j + kOfBase];
-    invert(own, joints);
-    std::fill(m.begin(), m.end(), 0.0);
-    for (int i = 0; i < joints; ++i)
-      for (int j = 0; j < joints; ++j) m[size_t(i + kOfBase) * n + j + kOfBase] = own[size_t(i) * joints + j];
-  } else {
-    invert(m, n);
-  }
+  if (!(links_[body.first_link].mass > 0))  // the base is held
+    for (int i = 0; i < kOfBase; ++i)
+      for (int j = 0; j < n; ++j) m[size_t(i) * n + j] = m[size_t(j) * n + i] = 0;
+  mass_[number] = m;
+  invert_mass(m, n);
 }
 
 }  // namespace overlapper

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "geometry/vec.h"
@@ -39,6 +40,9 @@ struct MovedLink {
   int tree = -1;
   std::vector<int> moved;
 };
+
+/// Inverts a symmetric mass matrix by rows in place by Cholesky's method. A coordinate without mass does not move.
+void invert_mass(std::vector<double>& m, int n);
 
 /// Bodies of links, and their velocity coordinates. A body has six coordinates of its base, in the world: linear at the
 /// centre of mass, and angular. The coordinates of its joints follow, in the order of their links. A fixed base also
@@ -86,6 +90,15 @@ class Multibodies {
   /// The inverse mass matrix by rows; zeros for coordinates that forces do not move.
   std::span<const double> inverse_mass(int body) const { return inverse_mass_[body]; }
 
+  /// Replaces it until the next `place`, and returns the one before.
+  std::vector<double> exchange_inverse_mass(int body, std::vector<double> other) {
+    return std::exchange(inverse_mass_[body], std::move(other));
+  }
+
+  /// The mass matrix of a body with joints by rows, with zeros for a base that is held. It is empty for other bodies,
+  /// and for trees of a simulator.
+  std::span<const double> mass(int body) const { return mass_[body]; }
+
  private:
   void make_room();
   void find_inverse_mass(int body);
@@ -97,7 +110,7 @@ class Multibodies {
   int coordinates_ = 0;
   std::vector<Pose> frames_;
   std::vector<Motion> motions_;  ///< per coordinate of all bodies; not used for bases
-  std::vector<std::vector<double>> inverse_mass_;
+  std::vector<std::vector<double>> inverse_mass_, mass_;
 };
 
 }  // namespace overlapper

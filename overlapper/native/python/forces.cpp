@@ -168,7 +168,7 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
 }
 
 nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_given, nb::handle acceleration_given,
-                nb::handle damped_given, bool distributed, nb::handle ahead_given) {
+                nb::handle damped_given, bool distributed, nb::handle ahead_given, nb::handle motors_given) {
   const size_t coordinates = solver.bodies().coordinates(), count = solver.patches().size();
   const auto velocity = numbers(velocity_given, "velocity", coordinates);
   const auto acceleration = numbers(acceleration_given, "acceleration", coordinates);
@@ -186,11 +186,23 @@ nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_give
   } else if (count > 0 && !solver.bodies().has_links()) {
     fail("ahead", "must be given for the trees of a simulator");
   }
+  std::vector<Motor> motors;
+  if (!motors_given.is_none()) {
+    const Doubles rows = to_doubles(motors_given, "motors", "an array of numbers");
+    if (rows.size() % 4 != 0) fail("motors", "must have 4 numbers in a row");
+    for (size_t i = 0; i < rows.size(); i += 4) {
+      const double *row = rows.data() + i, coordinate = row[0], gain = row[2], limit = row[3];
+      if (!(coordinate >= 0 && coordinate < double(coordinates))) fail("motors", "must begin with coordinates");
+      if (!(gain >= 0 && gain <= 1 && limit >= 0 && std::isfinite(row[1])))
+        fail("motors", "must have a finite target, a gain from 0 to 1 and a limit from 0");
+      motors.push_back({int(coordinate), row[1], gain, limit});
+    }
+  }
   ContactSolver::Solution solution;
   {
     const nb::gil_scoped_release release;
-    solution = solver.solve(
-        {duration, velocity, acceleration, damped, distributed ? Friction::kDistributed : Friction::kEllipsoid, ahead});
+    solution = solver.solve({duration, velocity, acceleration, damped,
+                             distributed ? Friction::kDistributed : Friction::kEllipsoid, ahead, motors});
   }
   std::vector<Vec3> force, torque, slip, normal;
   for (const PatchForce& each : solution.patches)
@@ -342,23 +354,26 @@ rad. (n, 2): the same for the centre of mass of each link in the world.)");
 `duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.)");
   cls.def(
       "solve", &solve, "duration"_a, "velocity"_a, "acceleration"_a, "damped"_a.none(), "distributed"_a,
-      "ahead"_a.none() = nb::none(),
+      "ahead"_a.none() = nb::none(), "motors"_a.none() = nb::none(),
       nb::sig("def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: "
               "numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: "
-              "collections.abc.Sequence[typing.Any] | None = None) -> "
+              "collections.abc.Sequence[typing.Any] | None = None, motors: numpy.typing.ArrayLike | None = None) -> "
               "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.float64], int, float]"),
       R"(The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
-without the patches. Rows that are `damped` choose stability over energy; without the argument, no row does. `ahead` has
-a pair for each link: the position of its centre of mass after the step, in m, if the coordinates keep their velocity,
-and the quaternion xyzw of its rotation until then. The trees of a simulator need it if there are patches.
+without the patches and the motors. Rows that are `damped` choose stability over energy; without the argument, no row
+does. `ahead` has a pair for each link: the position of its centre of mass after the step, in m, if the coordinates keep
+their velocity, and the quaternion xyzw of its rotation until then. The trees of a simulator need it if there are
+patches. `motors` (m, 4) are rows of a coordinate, a target, a gain from 0 to 1 and the largest force. A motor alone
+changes the velocity v that its coordinate would have without it to (1 - gain) v + target. Motors of the trees of a
+simulator do nothing.
 
 (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
-last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and
-how often the patches were gone through, and the largest change of a slip in the last time, as a fraction of the largest
-slip.)");
+last known, (n, 6) force and torque on the links about their centres of mass, the part of patches and motors in the
+acceleration, and how often the patches were gone through, and the largest change of a slip in the last time, as a
+fraction of the largest slip.)");
 }
 
 }  // namespace overlapper::python

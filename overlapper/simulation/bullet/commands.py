@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from copy import deepcopy
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import pybullet
 
@@ -18,12 +19,46 @@ COMMANDS = MOTORS | PUSHES | {"changeConstraint", "resetSimulation"}
 # The default gains of pybullet: the fraction of an error that a step removes.
 DEFAULT_GAINS = {"positionGain": 0.1, "velocityGain": 1.0}
 
+# The arguments that make a `Servo`, for one joint and for many, and their defaults.
+AIMS = {
+    ("targetPosition", "targetPositions"): 0.0,
+    ("targetVelocity", "targetVelocities"): 0.0,
+    ("positionGain", "positionGains"): DEFAULT_GAINS["positionGain"],
+    ("velocityGain", "velocityGains"): DEFAULT_GAINS["velocityGain"],
+    ("force", "forces"): 1e5,
+    ("maxVelocity", ""): 0.0,
+}
+POSITION_GAIN = 2
+
 MAX_FORCE, DEFAULT_MAX_FORCE = 10, 500.0  # of getConstraintInfo
 
 Command = tuple[str, Arguments]
 
 StateCall = tuple[Literal["saved", "restored", "removed"], int | None]
 """What a call of the script did to a state, and the number of the state. States in files have no number."""
+
+
+class Servo(NamedTuple):
+    """A motor of a joint with one coordinate, as pybullet was told of it: what it aims at, its gains and limits."""
+
+    position: float
+    velocity: float
+    position_gain: float
+    velocity_gain: float
+    force: float
+    """N or N m"""
+    fastest: float
+
+    def in_a_step(self, at: float, length: float, share: float) -> tuple[float, float, float]:
+        """Return target, gain and limit of `ContactSolver.solve` for a joint that is `at` a position.
+
+        The step takes `length` (s), which is a `share` of the time step of the script.
+        """
+        proportional, gain = shorter(self.position_gain, self.velocity_gain, share)
+        target = proportional * (self.position - at) / length + gain * self.velocity
+        if self.fastest > 0:
+            target = min(max(target, -self.fastest), self.fastest)
+        return target, gain, self.force
 
 
 class Commands:
@@ -40,6 +75,8 @@ class Commands:
         """The calls about saved states of the bodies."""
         self._lasting: dict[Any, Command] = {}  # by body and joint, or by constraint, in the order of the calls
         self._momentary: list[Command] = []
+        self.servos: dict[tuple[int, int], Servo] = {}
+        """The motors that are known, by body and joint."""
         self._length = 0.0  # of the steps for which the lasting commands were last repeated
 
     def learn(self) -> None:
@@ -102,6 +139,10 @@ class Commands:
             body = arguments["bodyUniqueId"]
             joints = arguments["jointIndices"] if name in ARRAYS else [arguments["jointIndex"]]
             self._keep([(body, joint) for joint in joints], command)
+            for joint, servo in zip(joints, _servos(name, command[1], len(joints))):
+                self.servos.pop((body, joint), None)
+                if servo:
+                    self.servos[body, joint] = servo
         elif name == "changeConstraint":
             # An argument that a call leaves out keeps its value.
             constraint = arguments["userConstraintUniqueId"]
@@ -109,6 +150,7 @@ class Commands:
             self._keep([constraint], (name, before | command[1]))
         else:
             self._lasting, self._momentary = {}, []
+            self.servos.clear()
         # pybullet took the command for the script's step length, which is not that of our substeps.
         self._length = 0.0
 
@@ -116,6 +158,33 @@ class Commands:
         for key in keys:
             self._lasting.pop(key, None)
             self._lasting[key] = command
+
+
+def _servos(name: str, arguments: Arguments, count: int) -> Iterator[Servo | None]:
+    """Yield the motors of a command to `count` joints, None for other kinds and for gains that overshoot."""
+    mode = arguments.get("controlMode")
+    if mode not in (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL) or "MultiDof" in name:
+        yield from [None] * count
+        return
+    columns = []
+    for (one, many), default in AIMS.items():
+        if name in ARRAYS and many in arguments:
+            columns.append([*arguments[many]])
+        else:
+            columns.append([arguments.get(one, default)] * count)
+    if mode == pybullet.VELOCITY_CONTROL:
+        columns[POSITION_GAIN] = [0.0] * count
+    for servo in map(Servo, *columns):
+        yield servo if 0 <= servo.velocity_gain <= 1 else None
+
+
+def shorter(position_gain: float, velocity_gain: float, share: float) -> tuple[float, float]:
+    """Return gains for steps whose length is this share of the script's time step.
+
+    After all substeps of a step, the same velocity error is left as after one whole step.
+    """
+    slower = 1 - (1 - velocity_gain) ** share if 0 <= velocity_gain <= 1 else velocity_gain
+    return position_gain * share * (slower / velocity_gain if velocity_gain else share), slower
 
 
 def _gains(name: str, arguments: Arguments, share: float) -> Arguments:
@@ -129,10 +198,7 @@ def _gains(name: str, arguments: Arguments, share: float) -> Arguments:
         [*arguments[gain + s]] if name in ARRAYS and gain + s in arguments else [arguments.get(gain, default)] * many
         for gain, default in DEFAULT_GAINS.items()
     )
-    # After all substeps of a step, the same velocity error is left as after one whole step.
-    slower = [1 - (1 - each) ** share if 0 <= each <= 1 else each for each in velocities]
-    told: dict[str, list[float]] = {"velocityGain": slower}
-    if mode == pybullet.POSITION_CONTROL:
-        quotients = [share * (new / old if old else share) for new, old in zip(slower, velocities)]
-        told["positionGain"] = [gain * quotient for gain, quotient in zip(positions, quotients)]
-    return {gain + s: each if name in ARRAYS else each[0] for gain, each in told.items()}
+    told = dict(zip(DEFAULT_GAINS, zip(*(shorter(*each, share) for each in zip(positions, velocities)))))
+    if mode == pybullet.VELOCITY_CONTROL:
+        del told["positionGain"]
+    return {gain + s: [*each] if name in ARRAYS else each[0] for gain, each in told.items()}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from itertools import repeat
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from overlapper import _core
 from overlapper.quaternion import rotated
 from overlapper.simulation.bullet.calls import unheard
+from overlapper.simulation.bullet.commands import Servo
 from overlapper.simulation.bullet.joints import joint_between
 from overlapper.simulation.bullet.other_forces import LearntForces
 from overlapper.simulation.model import BASE, Array
@@ -31,11 +33,15 @@ Known = tuple[list[Any], _core.ContactSolver]
 class BulletDynamics:
     """See `Dynamics`: the links of some bodies, base by base, and the `solver` that knows their masses and joints.
 
-    `links` are (body, link) in the solver's order, and `place` is the index of each.
+    `links` are (body, link) in the solver's order, and `place` is the index of each. `servos` are the motors that are
+    known, by body and joint. They may change.
     """
 
-    def __init__(self, client: int, bodies: Sequence[int]) -> None:
+    def __init__(
+        self, client: int, bodies: Sequence[int], servos: Mapping[tuple[int, int], Servo] | None = None
+    ) -> None:
         self._client = client
+        self._servos = {} if servos is None else servos
         self._joints = {id: [*range(pybullet.getNumJoints(id, client))] for id in bodies}
         self.links = [(id, link) for id, joints in self._joints.items() for link in (BASE, *joints)]
         self.place = {each: k for k, each in enumerate(self.links)}
@@ -181,12 +187,25 @@ class BulletDynamics:
         velocity = np.empty(self.solver.coordinates)
         bases = np.array([*map(pybullet.getBaseVelocity, self._joints, repeat(client))]).reshape(-1, 6)
         velocity[self._of_bases] = bases
+        self._positions: list[tuple[int, int, float, int]] = []  # of joints: body, joint, position and coordinate
         for id, joints, at in self._single:
-            velocity[at] = [state[1] for state in pybullet.getJointStates(id, joints, client)]
+            states = pybullet.getJointStates(id, joints, client)
+            velocity[at] = [state[1] for state in states]
+            self._positions += zip(repeat(id), joints, [state[0] for state in states], at)
         for id, joints, at in self._spherical:
             states = pybullet.getJointStatesMultiDof(id, joints, client)
             velocity[at] = [each for state in states for each in state[1]]
         return velocity
+
+    def motors(self, length: float, share: float) -> Array | None:
+        if not self._servos:
+            return None
+        rows = []
+        for id, joint, at, coordinate in self._positions:
+            servo = self._servos.get((id, joint))
+            if servo and servo.force > 0 and math.isfinite(at):
+                rows.append((coordinate, *servo.in_a_step(at, length, share)))
+        return np.array(rows).reshape(-1, 4)
 
     def ahead(self, duration: float, velocity: Array) -> None:
         return None

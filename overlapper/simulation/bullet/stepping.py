@@ -39,7 +39,7 @@ class Stepping:
         self._length = 0.0  # of the simulator's steps, within a step
 
     def dynamics(self, bodies: Sequence[int]) -> BulletDynamics:
-        self._dynamics = BulletDynamics(self._client, bodies)
+        self._dynamics = BulletDynamics(self._client, bodies, self._commands.servos)
         return self._dynamics
 
     def resumed(self, others: OtherForces) -> OtherForces | None:

@@ -147,6 +147,9 @@ class MujocoDynamics:
     def velocity(self) -> Array:
         return np.append(self._data.qvel, self._mocap.velocity)
 
+    def motors(self, length: float, share: float) -> None:
+        return None  # MuJoCo computes their forces before those of contacts
+
     def ahead(self, duration: float, velocity: Array) -> list[Pose]:
         data, later = self._data, self._later
         later.qpos[:] = data.qpos
