@@ -57,9 +57,6 @@ class Dynamics(Protocol):
     def weights(self) -> Array:
         """(n,) for each of `links`: the weight in N of its whole body with all joints, 0 if forces do not move it."""
 
-    def jointed(self) -> NDArray[np.bool_]:
-        """(n,) for each of `links`: whether its body has joints that move."""
-
     def read(self) -> bool:
         """Read masses and friction again. True if masses have changed, so that there is a new solver."""
 

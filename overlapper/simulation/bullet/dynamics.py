@@ -98,17 +98,9 @@ class BulletDynamics:
         """(n,) the weights of the links' bodies in N, 0 for bodies that nothing moves."""
         return self._weights
 
-    def jointed(self) -> NDArray[np.bool_]:
-        """(n,) whether the links' bodies have joints that move."""
-        jointed = self._jointed()
-        return np.array([id in jointed for id, _ in self.links], dtype=bool)
-
-    def _jointed(self) -> set[int]:
-        return {id for id, _, _ in (*self._single, *self._spherical)}
-
     def _moved_masses(self) -> Array:
         """(n,) the masses of the links' bodies, 0 for bodies that forces do not move."""
-        jointed = self._jointed()
+        jointed = {id for id, _, _ in (*self._single, *self._spherical)}
         of_body = {}
         for id, joints in self._joints.items():
             masses = [self._masses[self.place[id, link]][MASS] for link in (BASE, *joints)]

@@ -63,7 +63,7 @@ class VolumetricContact:
     substeps : int or 'auto', default 'auto'
         Number of parts of a step of the simulator. 'auto': with a `dissipation`, it follows from the stiffness and the
         masses, anew in every step. Without one, it follows from the motion. It is 1 for bodies that rest, 4 at most for
-        others and for robots, and more for small bodies that would pass through others.
+        others, and more for small bodies that would pass through others.
     restitution : float or callable, optional
         The speed after an impact over the speed before it. Slower impacts than 0.2 m/s have none. Default: that of the
         simulator. In pybullet it is the product of the two links' restitution, which is 0 unless it is set. In MuJoCo

@@ -26,17 +26,17 @@ REMEMBERED = 8
 # this angle (rad).
 STEADY = 5e-3
 
-# Contacts of bodies that move by less than this (m, rad) in a step do not change. Other contacts have at least
-# so many substeps: a box that rests some nanometres deep may lose its contact, and would then fall for a whole step.
-QUIET, LEAST = 1e-11, 2
+# No contact is lost in a step in which its surfaces move by less than this share of its depth. Other contacts have
+# at least so many substeps: a box that rests some nanometres deep may lose its contact, and would then fall for a whole
+# step.
+QUIET, LEAST = 0.1, 2
 
 
 class _Pairs(NamedTuple):
-    """The laws of pairs of shapes by name, the sizes of the smaller links, and whether a body of them has joints."""
+    """The laws of pairs of shapes by name, and the sizes of the smaller links."""
 
     laws: dict[str, Array]
     sizes: Array
-    jointed: bool
 
 
 class Masses:
@@ -54,7 +54,6 @@ class Masses:
         self.sizes = _sizes(bodies.shapes, self._links, self._tops, len(self.dynamics.links))
         self._smallest = self.sizes[self.sizes > 0].min(initial=np.inf)
         self._extents = _extents(bodies.shapes, self._links, len(self.dynamics.links))
-        self._jointed = self.dynamics.jointed()
         self._batch = Batch(bodies.shapes)  # for what is not yet: the one of `bodies` knows what is
         # By the pairs of shapes, as long as the simulator's numbers are the same.
         self._known: dict[bytes, _Pairs] = {}
@@ -91,17 +90,15 @@ class Masses:
     def patch_substeps(self, found: Overlaps, duration: float, velocity: Array, taken: int, most: int) -> int:
         """Return the number of substeps of a duration (s) in which the patches of the placed overlaps move little.
 
-        `taken` substeps of the step are over. The number is `most` at most, and always if a body with joints touches
-        another one: motors follow their commands in another way in longer substeps.
+        `taken` substeps of the step are over. The number is `most` at most.
         """
-        of = self._of(found)
-        if of.jointed:
-            return most
-        if not len(found) or np.abs(velocity).max(initial=0.0) * duration < QUIET:
+        if not len(found):
             return 1
-        travel, _ = self.dynamics.solver.travel(duration, velocity)
+        of, solver = self._of(found), self.dynamics.solver
+        travel, _ = solver.travel(duration, velocity)
         share = np.maximum(travel[:, 0] / of.sizes, travel[:, 1]) / STEADY
-        return min(max(1, LEAST - taken, math.ceil(float(share.max(initial=0.0)))), most)
+        least = 1 if (travel[:, 0] <= QUIET * solver.depths).all() else LEAST - taken
+        return min(max(1, least, math.ceil(float(share.max(initial=0.0)))), most)
 
     def moves_far(self, duration: float, velocity: Array) -> bool:
         """Whether a link moves by more than `STEADY` of the size of the smallest link within a duration (s)."""
@@ -126,7 +123,6 @@ class Masses:
             self._known[key] = _Pairs(
                 self._layers.of(links, self.dynamics, self.sizes),
                 np.asarray(self.sizes[links].min(axis=1)),
-                bool(self._jointed[links].any()),
             )
         return self._known[key]
 

@@ -90,13 +90,6 @@ class MujocoDynamics:
         masses[0] = 0  # of bodies that do not move
         return np.asarray((np.linalg.norm(model.opt.gravity) or G) * masses[trees[self._bodies] + 1])
 
-    def jointed(self) -> NDArray[np.bool_]:
-        """(n,) whether the kinematic trees of the links are more than a free body."""
-        model = self._model
-        trees = model.body_treeid[self._bodies]
-        coordinates = np.append(model.tree_dofnum, COORDINATES)  # the last one is for bodies that do not move
-        return np.asarray(coordinates[trees] != COORDINATES)
-
     def other_forces(self) -> KnownForces:
         return KnownForces(self)
 
