@@ -27,8 +27,9 @@ std::optional<Sums> best_sums(PieceSetting setting, const Sums& none, Add add) {
     if (add(setting, again) && off(again.totals) < off(best.totals)) best = again;
   };
   const auto is_open = [&] { return !(open_volume(best.totals) <= kMostOpen * best.totals.volume); };
-  // If the surface does not close, something is hidden in an interval that was sampled in its middle only.
-  setting.closely = true;
+  // If the surface does not close, something is hidden in an interval that was sampled in its middle only. Or cuts are
+  // less accurate than the volumes on their two sides.
+  setting.closely = setting.cuts = true;
   if (is_open()) try_again();
   // Or faces and cuts lie so near each other that only rounding orders them. They then count as one.
   const auto try_layer = [&](double part) {

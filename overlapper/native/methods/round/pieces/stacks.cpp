@@ -63,7 +63,7 @@ std::optional<Stack> stack_of(const PieceContext& at, int way) {
   const SlicedPiece& piece = at.piece;
   std::optional<Stack> stack = slicing::stack_of(piece.rounds, piece.walls, piece.extent, way);
   if (!stack) return std::nullopt;
-  stack->stretch = at.setting.stretch, stack->areas = at.setting.areas;
+  stack->stretch = at.setting.stretch, stack->areas = at.setting.areas, stack->cuts = at.setting.cuts;
   if (piece.around) {
     const auto [least, most] = piece.around->range(stack->n);
     const double here = dot(piece.offset, stack->n), margin = 1e-9 * (most - least) + 1e-13 * piece.extent;

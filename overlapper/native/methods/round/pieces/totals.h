@@ -99,6 +99,7 @@ struct PieceSetting {
   PatchView view;                             ///< of the patch, if one is summed
   bool areas = true;                          ///< wanted; otherwise, those of an ellipsoid may be bounds
   bool closely = false;                       ///< sample all of every interval
+  bool cuts = false;                          ///< also integrate cuts through bodies accurately
   bool many_walls = false;                    ///< the same for two or more rounds: many planes meet their corners
   double sure = kSure;                        ///< negligible rounding of a polytope's corners, relative to the volume
   double layer = 0;                           ///< m: planes at most this far apart count as one

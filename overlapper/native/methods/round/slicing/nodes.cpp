@@ -81,7 +81,7 @@ class Bundle {
 
   void add(const Row& t, const Row& tail, const Row& counts) {
     t_ = t, counts_ = counts;
-    area_ = x_ = y_ = xx_ = yy_ = xy_ = surface_ = {};
+    area_ = x_ = y_ = xx_ = yy_ = xy_ = surface_ = cut_ = {};
     find_sides_by_rows(stack_, t_, tail, sides_);
     if (outline_.whole_disc) add_disc();
     else go_round();
@@ -90,6 +90,7 @@ class Bundle {
   const Integrals& integrals() const { return sum_; }
   const Row& areas() const { return area_; }
   const Row& surfaces() const { return surface_; }
+  const Row& cuts() const { return cut_; }
 
  private:
   void side(const Line& line, Row& result) const {
@@ -209,6 +210,9 @@ class Bundle {
       blur[k] = counts * (offset + rate * std::abs(t) + nx * std::max(std::abs(px), std::abs(qx)) +
                           ny * std::max(std::abs(py), std::abs(qy)));
     }
+    if (stack_.cuts && line.owner == kCut)
+      for (int k = 0; k < kRow; ++k)
+        cut_[k] += ((to.x[k] - from.x[k]) * d.x + (to.y[k] - from.y[k]) * d.y) * inverse * std::sqrt(norm2(normal));
     const double all = sum(weight), mx = sum(x), my = sum(y), mt = sum(up);
     const Vec3 place{mx + s.x * mt, my + s.y * mt, mt};
     sum_.correction += line.offset_tail * all - line.rate_tail * mt - line.normal_tail.x * mx - line.normal_tail.y * my;
@@ -492,7 +496,7 @@ class Bundle {
   const Outline& outline_;
   Row t_, counts_;
   Sides sides_;
-  Row area_, x_, y_, xx_, yy_, xy_, surface_;  ///< per slice
+  Row area_, x_, y_, xx_, yy_, xy_, surface_, cut_;  ///< per slice
   Integrals sum_;
 };
 
@@ -506,7 +510,8 @@ Integrals measure_by_rows(const Stack& stack, const Outline& outline, const Node
     }
     bundle.add(t, tail, counts);
     for (int k = 0; k < kRow && first + k < nodes.size; ++k)
-      slices.volume[first + k] = bundle.areas()[k], slices.area[first + k] = bundle.surfaces()[k];
+      slices.volume[first + k] = bundle.areas()[k], slices.area[first + k] = bundle.surfaces()[k],
+                            slices.cut[first + k] = bundle.cuts()[k];
   }
   return bundle.integrals();
 }

@@ -29,9 +29,9 @@ struct Nodes {
   void append(double at, double counts) { t[size] = at, tail[size] = 0, weight[size] = counts, ++size; }
 };
 
-/// The area of each slice, and the area of the surface per unit of t.
+/// The area of each slice, and the area of the surface and of cuts per unit of t.
 struct Slices {
-  std::array<double, kMostNodes> volume, area;
+  std::array<double, kMostNodes> volume, area, cut;
 };
 
 /// The weighted sum over slices that all have this outline.

@@ -20,7 +20,7 @@ static_assert(2 * kNodes32.size() == kMostNodes);
 static_assert(std::ranges::all_of(kRules, [](Rule rule) { return rule.size() % 2 == 0; }));
 
 /// If the relative error of a rule is smaller, no other rule is tried.
-constexpr double kVolumeError = 1e-14, kAreaError = 1e-12;
+constexpr double kVolumeError = 1e-14, kAreaError = 1e-12, kCutError = 1e-13;
 /// The same for the area of a stretched ball, from a bound of its terms.
 constexpr double kStretchedAreaError = 1e-11;
 /// If the last coefficients of the series are smaller, relative to the whole, halving is not worth it. A rule of n
@@ -43,12 +43,13 @@ struct RulePart {
   Range range;
   Rule rule;
   Integrals integrals;
-  Series volume, area;
+  double cut_area = 0;  ///< m²
+  Series volume, area, cut;
   std::array<Sample, kMostNodes> samples;
 };
 
 RulePart apply(const Stack& stack, const Outline& outline, const Range& range, Rule rule) {
-  RulePart part{&outline, range, rule, {}, {}, {}, {}};
+  RulePart part{&outline, range, rule, {}, 0, {}, {}, {}, {}};
   const int half = static_cast<int>(rule.size()), size = 2 * half;
   Nodes nodes;
   nodes.size = size;
@@ -67,6 +68,9 @@ RulePart apply(const Stack& stack, const Outline& outline, const Range& range, R
     const int mirror = size - 1 - i;
     part.volume.add(rule[i], rate[i] * slices.volume[i], rate[mirror] * slices.volume[mirror]);
     part.area.add(rule[i], rate[i] * slices.area[i], rate[mirror] * slices.area[mirror]);
+    if (!stack.cuts) continue;
+    part.cut.add(rule[i], rate[i] * slices.cut[i], rate[mirror] * slices.cut[mirror]);
+    part.cut_area += nodes.weight[i] * slices.cut[i] + nodes.weight[mirror] * slices.cut[mirror];
   }
   for (int i = 0; i < size; ++i) part.samples[i] = {nodes.t[i], slices.volume[i]};
   return part;
@@ -87,7 +91,8 @@ class Integrating {
       if (i + 1 < intervals.size()) range.after = intervals[i + 1].high - intervals[i + 1].low;
       parts.push_back(apply(stack_, intervals[i].outline, range, first(range.high - range.low < kSmall * whole)));
     }
-    for (const RulePart& part : parts) sum_.about += part.integrals.volume, area_ += part.integrals.area;
+    for (const RulePart& part : parts)
+      sum_.about += part.integrals.volume, area_ += part.integrals.area, cut_area_ += part.cut_area;
     volume_ += sum_.about;
     for (const RulePart& part : parts)
       if (!add(part, 0)) return false;
@@ -114,7 +119,10 @@ class Integrating {
       // If terms fall slowly, more nodes help little.
       if (part.area.stretched_error(part.integrals.area) > kStretchedAreaError * area_) return kHopeless;
     }
-    return std::max(volume, of(part.area, part.integrals.area, area_, kAreaError, kAreaTail));
+    const double area = of(part.area, part.integrals.area, area_, kAreaError, kAreaTail);
+    // A volume may be accurate long before the chords of its cuts are. What is cut on both sides then does not close.
+    const double cut = stack_.cuts ? of(part.cut, part.cut_area, cut_area_, kCutError, kAreaTail) : 0;
+    return std::max({volume, area, cut});
   }
 
   /// The rule with enough more nodes, or the largest one. No value if halves need fewer nodes.
@@ -156,6 +164,7 @@ class Integrating {
 
   const Stack& stack_;
   double volume_, area_;  ///< about the totals of all pieces so far and of this one
+  double cut_area_ = 0;   ///< of this piece
   bool few_;
   double strictness_;
   Sum& sum_;

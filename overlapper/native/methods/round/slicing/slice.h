@@ -130,6 +130,7 @@ struct Stack {
   std::optional<View> view;                   ///< set if a surface is viewed
   const quadric::Stretch* stretch = nullptr;  ///< for an ellipsoid: maps the ball and all else to the world
   bool areas = true;                          ///< wanted; otherwise, those of an ellipsoid are bounds
+  bool cuts = false;                          ///< cuts through bodies are also integrated accurately
 
   /// The stretched area of a part of a plane with the area vector `normal` along l, m and n.
   double area(Vec3 normal) const { return stretch->area(normal.x * l + normal.y * m + normal.z * n); }
