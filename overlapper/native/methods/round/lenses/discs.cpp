@@ -52,16 +52,16 @@ Vec3 rim(std::span<const slicing::Wall> walls, Vec3 contact, double slack) {
 }
 
 /// The direction across the slices. There are two such directions; this is the one that is more across the contact, or
-/// more along a rim.
-Vec3 across_slices(const Principal& of, Vec3 contact, Vec3 rim) {
+/// more along a rim, unless the other one is wanted.
+Vec3 across_slices(const Principal& of, Vec3 contact, Vec3 rim, bool other) {
   const auto& [low, middle, high] = of.value;
   const double whole = high - low;
   if (!(whole > 4 * DBL_EPSILON * high)) return norm2(contact) > 0 ? any_orthogonal(unit(contact)) : of.axis[0];
   const double sine = std::sqrt((high - middle) / whole), cosine = std::sqrt((middle - low) / whole);
   const Vec3 a = cosine * of.axis[0] + sine * of.axis[2], b = cosine * of.axis[0] - sine * of.axis[2];
   const auto size = [](Vec3 p, Vec3 q) { return std::abs(overlapper::dot(p, q)); };
-  if (norm2(rim) > 0) return unit(size(a, rim) >= size(b, rim) ? a : b);
-  return unit(size(a, contact) <= size(b, contact) ? a : b);
+  if (norm2(rim) > 0) return unit((size(a, rim) >= size(b, rim)) != other ? a : b);
+  return unit((size(a, contact) <= size(b, contact)) != other ? a : b);
 }
 
 /// Axes of a slice, and their images by K.
@@ -194,7 +194,8 @@ std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& seco
   return result;
 }
 
-std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::span<const slicing::Wall> walls) {
+std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::span<const slicing::Wall> walls,
+                           bool other) {
   const WideMatrix& k = second.k;
   const WideVector& k_centre = second.middle;
   const DoubleDouble one{1}, slack_first = one - overlapper::dot(c, c),
@@ -203,7 +204,7 @@ std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::s
   const Mat3 plain = rounded(k);
   const Vec3 contact = rounded(c);
   const Vec3 along_rim = rim(walls, contact, slack_first.head);
-  const Axes axes = settled_axes(across_slices(principal(plain), contact, along_rim), k);
+  const Axes axes = settled_axes(across_slices(principal(plain), contact, along_rim, other), k);
 
   Discs result;
   result.normal = axes.n, result.x = axes.x, result.y = axes.y;
@@ -215,14 +216,26 @@ std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::s
   // About -c_n, in the plane where the first body's surface is across c. A small slack keeps the foot near.
   const double steep = c_x.head * c_x.head + c_y.head * c_y.head + slack_first.head;
   Flat lean{-c_n.head * c_x.head / steep, -c_n.head * c_y.head / steep};
+  const DoubleDouble p_x = round * overlapper::dot(axes.along_n, axes.along_x),
+                     p_y = round * overlapper::dot(axes.along_n, axes.along_y);
+  const auto of_second = [&](const WideVector& v) { return round * overlapper::dot(k_centre, v); };
+  const DoubleDouble g_n = of_second(axes.along_n), g_x = of_second(axes.along_x), g_y = of_second(axes.along_y);
+  // The centres: of the first (c_x, c_y) − t lean, of the second (g_x, g_y) − t (m_x, m_y).
+  const DoubleDouble e_x = g_x - c_x, e_y = g_y - c_y;
+  const Flat start{c_x.head, c_y.head}, between{e_x.head, e_y.head};
+  const double apart2 = dot(between, between);
+  const double share = apart2 > 0 ? std::clamp(-dot(start, between) / apart2, 0.0, 1.0) : 0;
+  // The part inside a thin cylinder leads along its axis. The foot then stays beside it, and slacks stay small.
+  if (const double square = dot(start, start); second.cylinder && square > 0) {
+    const Flat aside{-start.y, start.x};
+    lean = lean - (share * dot(aside, Flat{p_x.head, p_y.head}) / square) * aside;
+  }
   constexpr double kLeastAlong = 1e-2;
   if (const double rise = overlapper::dot(along_rim, axes.n); std::abs(rise) > kLeastAlong)
     lean = {overlapper::dot(along_rim, axes.x) / rise, overlapper::dot(along_rim, axes.y) / rise};
   result.lean = lean, result.first_level = c_n.head;
   const DoubleDouble lean_x{lean.x}, lean_y{lean.y};
   const WideVector along = axes.along_n + (lean_x * axes.along_x + lean_y * axes.along_y);
-  const auto of_second = [&](const WideVector& v) { return round * overlapper::dot(k_centre, v); };
-  const DoubleDouble g_n = of_second(axes.along_n), g_x = of_second(axes.along_x), g_y = of_second(axes.along_y);
   const DoubleDouble m_x = round * overlapper::dot(along, axes.along_x),
                      m_y = round * overlapper::dot(along, axes.along_y);
   using Slack = std::array<DoubleDouble, 3>;
@@ -230,12 +243,7 @@ std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::s
                        -(one + lean_x * lean_x + lean_y * lean_y)};
   const Slack of_other{round * slack_second, twice(g_n + lean_x * g_x + lean_y * g_y),
                        -(round * overlapper::dot(along, along))};
-  // The centres: of the first (c_x, c_y) − t lean, of the second (g_x, g_y) − t (m_x, m_y).
-  const DoubleDouble e_x = g_x - c_x, e_y = g_y - c_y;
-  result.apart = {{e_x.head, e_y.head}, {(lean_x - m_x).head, (lean_y - m_y).head}};
-  const Flat start{c_x.head, c_y.head};
-  const double apart2 = dot(result.apart.start, result.apart.start);
-  const double share = apart2 > 0 ? std::clamp(-dot(start, result.apart.start) / apart2, 0.0, 1.0) : 0;
+  result.apart = {between, {(lean_x - m_x).head, (lean_y - m_y).head}};
   const DoubleDouble part{share}, rest = one - part;
   result.share = share;
   result.centre = {{(c_x + part * e_x).head, (c_y + part * e_y).head},
@@ -246,8 +254,6 @@ std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::s
     result.first_slack[i] = of_first[i].head, result.second_slack[i] = of_other[i].head;
   }
   result.first_square = {(slack_first + c_x * c_x + c_y * c_y).head, 2 * c_n.head, -1};
-  const DoubleDouble p_x = round * overlapper::dot(axes.along_n, axes.along_x),
-                     p_y = round * overlapper::dot(axes.along_n, axes.along_y);
   // A section that is not quite a disc is replaced by a disc of equal area. The square of the radius is a difference.
   // It may be small relative to its change by the section's shape.
   const DoubleDouble whole = value / (axes.xx * axes.yy - axes.xy * axes.xy);

@@ -3,6 +3,7 @@
 
 #include "geometry/scratch.h"
 #include "methods/round/lenses/lenses.h"
+#include "methods/round/pieces/piece.h"
 #include "methods/round/pieces/planar_part.h"
 #include "methods/round/pieces/stretched.h"
 
@@ -48,6 +49,36 @@ pieces::RoundSurface surface_in_ellipsoid(const slicing::Round& round, std::span
   return surface;
 }
 
+/// Whether the ellipsoid contains a ball, or a cylinder that is rounded at both its ends.
+bool contains_round(const InEllipsoid& of, const slicing::Round& round) {
+  constexpr double kInside = 1 - 1e-9;
+  const Vec3 h = of.stretch.half_axes, centre = rounded(round.centre - of.centre), axis = rounded(round.axis);
+  const Vec3 along = round.ball ? Vec3{} : round.half_length * Vec3{axis.x / h.x, axis.y / h.y, axis.z / h.z};
+  const double reach = round.radius / std::min({h.x, h.y, h.z});
+  return std::max(norm(centre + along), norm(centre - along)) + reach <= kInside;
+}
+
+/// Adds a part of a round that the ellipsoid contains: the part is measured alone. Its coordinates are along the axes
+/// of the ellipsoid, in m. False if slices give up.
+bool add_contained_part(const slicing::Round& round, std::span<const slicing::Wall> walls,
+                        const pieces::PieceSetting& setting, const quadric::Stretch& stretch, pieces::Sums& sums) {
+  pieces::Sums alone;
+  if (!pieces::add_piece(std::span(&round, 1), walls, nullptr, setting, alone)) return false;
+  const pieces::Totals& part = alone.totals;
+  const Vec3 h = stretch.half_axes;
+  const quadric::Stretch into_ball({1 / h.x, 1 / h.y, 1 / h.z});
+  pieces::Totals more;
+  static_cast<Moments&>(more) = into_ball.moments(part);
+  more.error = into_ball.volume * part.error, more.open = into_ball.volume * part.open;
+  more.area = part.area;
+  more.border = max_component(into_ball.cofactors) * part.border;
+  more.unbalanced = into_ball.normal(part.unbalanced);
+  sums.totals.add(more);
+  sums.totals.sizes += Moments{more.volume, abs(more.first), more.squares, abs(more.products)};
+  sums.totals.area_error += part.area_error;
+  return true;
+}
+
 }  // namespace
 
 std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& pair) {
@@ -70,6 +101,9 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
   pieces::cut(ellipsoid, other, nullptr, 0, pair.reference, pair.inside, of_ellipsoid);
   if (pair.outwards != 0 && !pieces::grow(of_other, pair.outwards)) return std::nullopt;
   const Vec3 h = *half_axes(ellipsoid);
+  // Many parts of a rounded hull within the ellipsoid are measured alone.
+  std::optional<pieces::Pieces> unstretched;
+  if (polytope_of(other.shape) && !pair.rounds) pieces::into_ball(ellipsoid, {1, 1, 1}, unstretched.emplace(of_other));
   pieces::into_ball(ellipsoid, h, of_other);
   pieces::into_ball(ellipsoid, h, of_ellipsoid);
   of_ellipsoid.rounds[0].radius = 1;
@@ -82,6 +116,9 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
   setting.extent = norm(rounded(of_ellipsoid.rounds[0].centre)) + 1;
   pieces::Sums sums;
   sums.patch = pair.patch ? std::optional(*pair.patch) : std::nullopt;
+  pieces::PieceSetting alone;
+  alone.extent = std::min(pieces::extent(other, rounded(pair.inside)), pieces::extent(ellipsoid, rounded(pair.inside)));
+  alone.cuts = true;
   InEllipsoid in{stretch, of_ellipsoid.rounds[0].centre, misplaced / std::min({h.x, h.y, h.z})};
   in.with_area = pair.with_area;
   if (pair.patch) {
@@ -96,6 +133,12 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
     const std::span<const slicing::Wall> walls = of_other.of(static_cast<int>(i));
     if (round && contains_part(in, *round, walls)) round = nullptr, contained = true;
     const double before = sums.totals.volume;
+    if (round && unstretched && contains_round(in, *round)) {
+      if (!add_contained_part(unstretched->rounds[number], unstretched->of(static_cast<int>(i)), alone, stretch, sums))
+        return std::nullopt;
+      contained = true;
+      continue;
+    }
     const Mat3 moved_before = in.ball_moved;
     const Vec3 force_before = in.second_force;
     if (round ? !add_part(in, *round, walls, sums)

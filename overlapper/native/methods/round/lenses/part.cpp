@@ -53,39 +53,70 @@ bool contains_part(const InEllipsoid& of, const slicing::Round& round, std::span
   return square <= kShallow && norm(off) + std::sqrt(std::max(0.0, square) * stretch) <= kInside;
 }
 
-bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slicing::Wall> walls, pieces::Sums& sums) {
-  std::optional<Discs> found = discs(of.centre, second_ball(round, of.stretch.half_axes), walls);
-  if (!found) return false;
+namespace {
+
+/// A part by slices of one direction.
+struct Measured {
+  Discs discs;
+  Integral integral;
+  pieces::Totals totals;
+};
+
+/// No value if the part cannot be measured.
+std::optional<Measured> measured(const InEllipsoid& of, const slicing::Round& round,
+                                 std::span<const slicing::Wall> walls, const Wanted& wanted, bool other) {
+  std::optional<Discs> found = discs(of.centre, second_ball(round, of.stretch.half_axes), walls, other);
+  if (!found) return std::nullopt;
   found->misplaced = of.misplaced / (kRoundings * DBL_EPSILON);
   found->second_area = area_rate(round, found->normal, of.stretch.half_axes);
+  Measured result{*found, integrate(*found, wanted), {}};
+  const Sums& part = result.integral.sums;
+  const double volume = part.moments.volume;
+  if (!(volume > 0)) return result;
+  // The error of the rules may be larger than their series tell; no error above half of this fraction was seen.
+  constexpr double kOfRules = 2e-13;
+  pieces::Totals& totals = result.totals;
+  static_cast<Moments&>(totals) = part.moments.along({found->normal, found->x, found->y});
+  totals.error = result.integral.error + kRoundings * DBL_EPSILON * (part.blur + volume) + kOfRules * volume +
+                 2 * found->oval * part.oval;
+  totals.border = part.border;
+  totals.unbalanced = found->along_axes(part.force + part.second_force + part.cut_force);
+  totals.open = pieces::missing(totals);
+  return result;
+}
+
+}  // namespace
+
+bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slicing::Wall> walls, pieces::Sums& sums) {
   pieces::Totals& totals = sums.totals;
   Wanted wanted;
   if (of.with_area) wanted.first = &of.stretch;
   wanted.view = of.view;
   wanted.closing = true;
   wanted.volume = totals.volume, wanted.border = totals.border;
-  const Integral integral = integrate(*found, wanted);
-  const Sums& part = integral.sums;
-  const double volume = part.moments.volume;
-  if (!(volume > 0)) return true;
-
-  pieces::Totals more;
-  static_cast<Moments&>(more) = part.moments.along({found->normal, found->x, found->y});
-  more.error = integral.error + kRoundings * DBL_EPSILON * (part.blur + volume) + 2 * found->oval * part.oval;
-  more.border = part.border;
-  more.unbalanced = found->along_axes(part.force + part.second_force + part.cut_force);
-  more.open = pieces::missing(more);
-  more.unbalanced = found->along_axes(part.force + part.second_force);
+  std::optional<Measured> found = measured(of, round, walls, wanted, false);
+  if (!found) return false;
+  // A part of the surface may be hidden between slices of one direction.
+  if (const auto off = [](const Measured& m) { return m.totals.open + m.totals.error; };
+      found->totals.open > pieces::kMostOpen * (totals.volume + found->totals.volume))
+    if (auto other = measured(of, round, walls, wanted, true);
+        other && other->totals.volume > 0 && off(*other) < off(*found))
+      found = std::move(other);
+  const Discs& discs = found->discs;
+  const Sums& part = found->integral.sums;
+  pieces::Totals more = found->totals;
+  if (!(more.volume > 0)) return true;
+  more.unbalanced = discs.along_axes(part.force + part.second_force);
   more.area = part.first_area + part.second_area;
   more.first_area = part.first_area;
-  more.pull = found->along_axes(part.force);
-  more.moment = found->moment(part.moved, of.stretch);
-  of.ball_moved = of.ball_moved + found->moved_along_axes(part.moved);
-  of.second_force += found->along_axes(part.second_force);
+  more.pull = discs.along_axes(part.force);
+  more.moment = discs.moment(part.moved, of.stretch);
+  of.ball_moved = of.ball_moved + discs.moved_along_axes(part.moved);
+  of.second_force += discs.along_axes(part.second_force);
   totals.add(more);
-  totals.sizes += Moments{volume, abs(more.first), more.squares, abs(more.products)};
-  totals.area_error += integral.area_error;
-  of.moved = std::max(of.moved, round.radius * (kRoundings * DBL_EPSILON + 2 * found->oval) * part.terms);
+  totals.sizes += Moments{more.volume, abs(more.first), more.squares, abs(more.products)};
+  totals.area_error += found->integral.area_error;
+  of.moved = std::max(of.moved, round.radius * (kRoundings * DBL_EPSILON + 2 * discs.oval) * part.terms);
   if (sums.patch) {
     const auto& p = part.patch;
     sums.patch->add(p[0], p[1], p[2], p[3], p[4], p[5]);

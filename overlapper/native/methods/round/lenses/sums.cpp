@@ -180,8 +180,13 @@ void add_second(const Place& place, const PlacedArc& of, const Wanted& wanted, S
 /// chord is a root of slack + aside² + chord (2 along − chord). Here `along` and `aside` are the mean centre in the
 /// slice's own axes. The chord is half the difference of the slacks, over the distance of the centres. Places are at
 /// most `away` from the foot.
+///
+/// The mean disc divides both the difference of the slacks and the distance of the centres. A disc that is much smaller
+/// than the other has a small part of both, and little of their rounding. Bodies without walls keep the wider bound of
+/// whole sizes.
 struct Terms {
-  double slack, centre, away;
+  std::array<double, 2> slack, centre;  ///< of the first disc and of the second
+  double away;
 };
 Terms terms_of_lens(const Place& place, double reach) {
   const Discs& d = place.discs;
@@ -189,22 +194,29 @@ Terms terms_of_lens(const Place& place, double reach) {
   const double t = place.t, chord = std::abs(s.chord), aside = std::abs(s.aside), away = chord + aside + reach;
   const Flat between = d.apart.at(t), middle = d.centre.at(t);
   const double apart = std::sqrt(dot(between, between)), along = std::abs(dot(s.ahead, middle));
-  const double centres = size_at(d.centre, t), bend = size_at(d.apart, t) / apart;
-  const double lever = along + chord;
-  const double sizes = size_at(d.slack, t) + size_at(d.difference, t) * (1 + lever / apart);
-  const double terms = sizes + away * away + d.misplaced + 2 * aside * (centres + along * bend) +
-                       2 * chord * (centres + (aside + lever) * bend);
-  return {terms, centres + size_at(d.apart, t) + chord * bend, away};
+  const double centres = size_at(d.centre, t), size_of_apart = size_at(d.apart, t), bend = size_of_apart / apart;
+  const double lever = along + chord, difference = size_at(d.difference, t);
+  const double slack = size_at(d.slack, t) + difference * lever / apart + away * away + d.misplaced +
+                       2 * aside * (centres + along * bend) + 2 * chord * (centres + (aside + lever) * bend);
+  const bool cut = d.cuts > 0;
+  const double centre = centres + chord * bend + (cut ? chord + aside * bend : 0);
+  const auto of = [&](double share) {
+    const double part = cut ? share : 1;
+    return std::array{slack + part * difference, centre + part * size_of_apart};
+  };
+  const auto [first_slack, first_centre] = of(d.share);
+  const auto [second_slack, second_centre] = of(1 - d.share);
+  return {{first_slack, second_slack}, {first_centre, second_centre}, away};
 }
 
 /// The movement of a lens's arcs by rounding, as slacks of both discs, in units of the last bit.
 void add_blur_of_lens(const Place& place, const Arc& first, const Arc& second, double reach, Sums& sums) {
   const Terms terms = terms_of_lens(place, reach);
   // A misplaced centre along the line of centres changes its segment.
-  sums.blur = (first.half_angle + second.half_angle) * terms.slack +
-              2 * terms.centre * (first.radius * bulge(first) + second.radius * bulge(second));
+  sums.blur = first.half_angle * terms.slack[0] + second.half_angle * terms.slack[1] +
+              2 * (terms.centre[0] * first.radius * bulge(first) + terms.centre[1] * second.radius * bulge(second));
   sums.oval = second.half_angle * terms.away * terms.away;
-  sums.terms = terms.slack;
+  sums.terms = std::ranges::max(terms.slack);
 }
 
 /// The same for a whole disc.
@@ -281,10 +293,10 @@ void add_blur_of_region(const Place& place, const Region& of, const std::array<d
   } else {
     const Terms terms = terms_of_lens(place, reach);
     const std::array<double, 2> rise{of.circle[0].radius - s.to_first, of.circle[1].radius - s.to_second};
-    sums.blur = (half_angle[0] + half_angle[1]) * terms.slack +
-                2 * terms.centre * (half_angle[0] * rise[0] + half_angle[1] * rise[1]);
+    sums.blur = half_angle[0] * terms.slack[0] + half_angle[1] * terms.slack[1] +
+                2 * (terms.centre[0] * half_angle[0] * rise[0] + terms.centre[1] * half_angle[1] * rise[1]);
     sums.oval = half_angle[1] * terms.away * terms.away;
-    sums.terms = terms.slack;
+    sums.terms = std::ranges::max(terms.slack);
   }
   const double away = std::abs(of.origin.x) + std::abs(of.origin.y) + reach;
   for (int i = 0; i < d.cuts; ++i) {
