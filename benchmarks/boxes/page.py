@@ -75,6 +75,10 @@ def write_page(path: Path, folder: Path) -> Path:
         for who, us in each.items():
             speed.append([name, who, duration(us), times(us / each["ours"])])
     flat = of("flat")["rectangles"]
+    widths: dict[str, dict[str, float]] = {}
+    for row in results.read(beside(path, "vectors.csv"))[1]:
+        widths.setdefault(row["name"], {})[row["figure"]] = float(row["value"])
+    longer = {name: times(each["without AVX2"] / each["AVX2"]) for name, each in widths.items()}
     return write(
         Path(__file__).with_suffix(".md"),
         folder / "boxes.md",
@@ -91,6 +95,10 @@ def write_page(path: Path, folder: Path) -> Path:
         cases=table(["issue", "true IoU", "ours", "pytorch3d"], cases),
         speed=table(["boxes", "library", "per pair", "times ours"], speed, left=2),
         difference=f"{flat['difference']:.0e}",
+        with_avx=duration(widths["any rotation"]["AVX2"] / 1e3),
+        without=duration(widths["any rotation"]["without AVX2"] / 1e3),
+        avx=f"{longer['any rotation']} times",
+        avx_street=f"{longer['street of 80 m']} times",
         flat_ours=duration(flat["ours"]),
         flat_shapely=duration(flat["shapely"]),
     )

@@ -29,6 +29,7 @@ COMMANDS = {
     "firsttry": "forces.firsttry",
     "boxes": "boxes.iou",
     "million": "boxes.million",
+    "vectors": "boxes.vectors",
     "motion": "motion.impacts",
     "motions": "motion.many",
     "audit": "costs.audit",

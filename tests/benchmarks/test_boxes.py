@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boxes import iou, million, page
+from boxes import iou, million, page, vectors
+from harness import results
 from overlapper import arrays
 
 ROOT = Path(__file__).parents[2]
@@ -38,3 +39,10 @@ def test_pairs_of_the_million_are_proved():
         found = million.of_class(np.random.default_rng(0), Namespace(pairs=50, proved=3), rotation, offset)
         assert found["pairs"] == 50 and found["proved"] == 3 and found["above"] == 0
         assert found["off"] < 1e-12 and 0 < found["stated"] <= 1e-12
+
+
+def test_volumes_without_avx2_have_the_same_bits(tmp_path, monkeypatch):
+    monkeypatch.setattr(vectors, "on_one_processor", lambda: None)
+    vectors.measure(Namespace(rounds=2), tmp_path / "vectors.csv")
+    _, rows = results.read(tmp_path / "vectors.csv")
+    assert len(rows) == 4 and all(float(row["value"]) > 0 for row in rows)

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 
 /// Rows of doubles for simultaneous operations, and the compiler features for them. Nothing else in the core is written
 /// for one compiler.
@@ -119,12 +120,14 @@ constexpr void choose(const LanesOf<std::int64_t, count>& which, const LanesOf<d
 #endif
 
 // A function marked OVERLAPPER_WIDER is compiled, with all functions that it calls, for AVX2 and FMA. It is called if
-// is_wider(). If the macro is not defined, all functions are compiled for the same machine.
+// is_wider(): if the processor has both, and the variable OVERLAPPER_NARROW of the environment is not set. If the macro is not defined, all functions are compiled for the same machine.
 #if defined(OVERLAPPER_VECTORS) && defined(__x86_64__)
 #define OVERLAPPER_FUSING __attribute__((target("avx2,fma")))
 #if !(defined(__AVX2__) && defined(__FMA__))
 #define OVERLAPPER_WIDER __attribute__((target("avx2,fma"), flatten))
-inline bool is_wider() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
+inline bool is_wider() {
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && !std::getenv("OVERLAPPER_NARROW");
+}
 #endif
 #else
 #define OVERLAPPER_FUSING
