@@ -88,7 +88,7 @@ def test_estimates_converge_with_samples_and_pitch():
         assert found == pytest.approx(float(pair.volume), rel=2e-2)
 
 
-@pytest.mark.parametrize("name", ["auto", "auto, batch", "auto, warm batch", "paper", "clipping", "scipy"])
+@pytest.mark.parametrize("name", ["auto", "auto, batch", "auto, warm batch", "paper", "scipy"])
 def test_exact_methods_are_exact_on_a_family_of_polyhedra(name):
     pairs = workloads.pairs_of("tetra")[:3]
     _, count, error, _ = turns.first_answers(pairs, name, peers.TIMED[name].settings[0])
@@ -100,7 +100,7 @@ def test_a_peer_that_cannot_be_asked_says_why():
     with pytest.raises(bodies.Unfit, match="slanted"):
         bodies.bounded(slanted.bodies)
     with pytest.raises(bodies.Unfit, match="round"):
-        peers.clipping(slanted.bodies, None)
+        peers.r3d(slanted.bodies, None)
     margins = workloads.pairs_of("meshes with margins")[0]
     for asked in (peers.monte_carlo, peers.paper):
         with pytest.raises(bodies.Unfit, match="rounded hull"):

@@ -120,7 +120,8 @@ constexpr void choose(const LanesOf<std::int64_t, count>& which, const LanesOf<d
 #endif
 
 // A function marked OVERLAPPER_WIDER is compiled, with all functions that it calls, for AVX2 and FMA. It is called if
-// is_wider(): if the processor has both, and the variable OVERLAPPER_NARROW of the environment is not set. If the macro is not defined, all functions are compiled for the same machine.
+// is_wider(): if the processor has both, and the variable OVERLAPPER_NARROW of the environment is not set. If the macro
+// is not defined, all functions are compiled for the same machine.
 #if defined(OVERLAPPER_VECTORS) && defined(__x86_64__)
 #define OVERLAPPER_FUSING __attribute__((target("avx2,fma")))
 #if !(defined(__AVX2__) && defined(__FMA__))
