@@ -51,14 +51,10 @@ class DepthSearch {
       const double before = offset_[facet];
       const double reached = ask(normal);
       const int p = static_cast<int>(hull_.points.size()) - 1;
-      if (local_minima && reached - before <= kClose * extent_ && leads_to_minimum(normal)) {
-        final_.resize(hull_.facets.size(), false);
-        final_[facet] = true;
-        if (best_.depth <= before + kSettled * extent_) break;
-        continue;
-      }
+      const double gap = reached - before;
       // The polytope never reaches a smooth rim. Stop when the facet's offset and the support agree to rounding.
-      if (reached - before <= rounding(extent_) || !hull_.sees(facet, p)) {
+      if ((local_minima && gap <= kClose * extent_ && leads_to_minimum(normal)) || gap <= rounding(extent_) ||
+          !hull_.sees(facet, p)) {
         final_.resize(hull_.facets.size(), false);
         final_[facet] = true;
         if (best_.depth <= before + kSettled * extent_) break;

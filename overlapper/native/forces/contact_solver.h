@@ -61,9 +61,7 @@ class ContactSolver {
     std::vector<std::array<Vec3, 2>> links;  ///< force and torque on each link, about its centre of mass
     std::vector<double> acceleration;        ///< of all coordinates, by the patches and the motors
     int sweeps = 0;
-    /// The largest change of a slip in the last sweep, over the largest slip without forces. At least 1 if some motors
-    /// do not agree with the patches.
-    double residual = 0;
+    double residual = 0;  ///< the largest change of a slip in the last sweep, over the largest slip without forces
   };
 
   /// Solves a step with the patches as they were placed.

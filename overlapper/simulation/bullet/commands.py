@@ -166,16 +166,17 @@ def _servos(name: str, arguments: Arguments, count: int) -> Iterator[Servo | Non
     if mode not in (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL) or "MultiDof" in name:
         yield from [None] * count
         return
-    columns = []
-    for (one, many), default in AIMS.items():
-        if name in ARRAYS and many in arguments:
-            columns.append([*arguments[many]])
-        else:
-            columns.append([arguments.get(one, default)] * count)
+    columns = [_by_joint(arguments, aim, count) for aim in AIMS]
     if mode == pybullet.VELOCITY_CONTROL:
         columns[POSITION_GAIN] = [0.0] * count
     for servo in map(Servo, *columns):
         yield servo if 0 <= servo.velocity_gain <= 1 else None
+
+
+def _by_joint(arguments: Arguments, aim: tuple[str, str], count: int) -> list[float]:
+    """Return the values of a key of `AIMS` for `count` joints."""
+    one, many = aim
+    return [*arguments[many]] if many in arguments else [arguments.get(one, AIMS[aim])] * count
 
 
 def shorter(position_gain: float, velocity_gain: float, share: float) -> tuple[float, float]:
@@ -194,10 +195,7 @@ def _gains(name: str, arguments: Arguments, share: float) -> Arguments:
         return {}
     many = len(arguments["jointIndices"]) if name in ARRAYS else 1
     s = "s" if name in ARRAYS else ""
-    positions, velocities = (
-        [*arguments[gain + s]] if name in ARRAYS and gain + s in arguments else [arguments.get(gain, default)] * many
-        for gain, default in DEFAULT_GAINS.items()
-    )
+    positions, velocities = (_by_joint(arguments, (gain, gain + "s"), many) for gain in DEFAULT_GAINS)
     told = dict(zip(DEFAULT_GAINS, zip(*(shorter(*each, share) for each in zip(positions, velocities)))))
     if mode == pybullet.VELOCITY_CONTROL:
         del told["positionGain"]

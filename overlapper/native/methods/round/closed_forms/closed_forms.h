@@ -49,9 +49,9 @@ bool add_sections_of_long_body(const RoundPair& pair, PatchSums& patch);
 bool add_sections_of_ellipsoid(const RoundPair& pair, PatchSums& patch);
 inline constexpr double kSureOfSections = 1e-10;
 
-/// The patch of a half-space, a box or a hull and a ball, a capsule, a cylinder or an ellipsoid that overlap: the
-/// sections of the round body by the planes. No value for other pairs, for an ellipsoid and a half-space, and for very
-/// shallow contacts. `centroid` and `area` are those of the patch.
+/// The patch of a flat body and a ball, a capsule, a cylinder or an ellipsoid that overlap. It consists of the sections
+/// of the round body by planes of the half-space, the box or the hull. No value for other pairs, for an ellipsoid and a
+/// half-space, and for very shallow contacts. `centroid` and `area` are those of the patch.
 std::optional<Patch> section_patch(const Placed& a, const Placed& b, Vec3 centroid, Vec3 area);
 
 }  // namespace overlapper::closed_forms

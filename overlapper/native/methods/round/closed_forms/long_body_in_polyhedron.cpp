@@ -23,8 +23,7 @@ struct LongBodySums {
 
   void add_faces(const quadric::Rings& part, std::span<const quadric::Section> sections, Vec3 centre) {
     if (!patch) return;
-    quadric::SectionView about = view;
-    about.u0 += dot(centre, view.u), about.v0 += dot(centre, view.v);
+    const quadric::SectionView about = view.about(centre, {});
     for (size_t f = 0; f < sections.size(); ++f)
       if (part.face(f)) about.add(sections[f], part.planes()[f].normal, *patch);
   }

@@ -155,10 +155,8 @@ bool add_round_part(const RoundPart& part, const EnclosingPolytope& polytope, co
 /// integrals as its curved part.
 void add_to_patch(const RoundPart& part, const PatchView& view, PatchSums& patch) {
   const bool rest = part.owner == view.owner;
-  quadric::SectionView of_part;
-  of_part.u = part.turn * view.u, of_part.v = part.turn * view.v;
-  of_part.normal = (rest ? -1.0 : 1.0) * (part.turn * view.normal);
-  of_part.u0 = view.u0 + dot(part.centre, view.u), of_part.v0 = view.v0 + dot(part.centre, view.v);
+  quadric::SectionView of_part = view.about(part.centre, part.turn);
+  if (rest) of_part.normal = -of_part.normal;
   for (size_t f = 0; f < part.owners.size(); ++f) {
     const quadric::Section& s = part.sections[f];
     if (s.area == 0 || (part.owners[f] == view.owner) == rest) continue;

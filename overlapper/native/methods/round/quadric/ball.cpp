@@ -71,8 +71,8 @@ void add_sector(Vec3 out, Disc& disc) {
   disc.third -= 2.0 / 15 * disc.square * cube * out;
 }
 
-/// Adds ∫ y yᵀ dA for the end of a sector in the direction of y, but for the mean over the angle: d(u wᵀ + w uᵀ) / dθ
-/// is 2 (1 − n nᵀ) − 4 u uᵀ for unit vectors u, and w = n × u.
+/// Adds ∫ y yᵀ dA for the end of a sector in the direction of y, without the mean over the angle. For unit vectors u
+/// and w = n × u, d(u wᵀ + w uᵀ) / dθ is 2 (1 − n nᵀ) − 4 u uᵀ.
 void add_end_of_sector(Vec3 y, Vec3 n, double side, Disc& disc) {
   disc.moments.add_second(side * disc.square * disc.square / 16 / norm2(y), y, cross(n, y));
 }

@@ -43,14 +43,22 @@ struct SectionView {
   Vec3 u, v, normal;
 
   SectionView() = default;
-  /// Of sections about the point `origin`, along the axes whose rotation to the world is given. They may be those of
-  /// the first body, which are seen from behind.
+  /// The sections are about the point `origin`, along axes that `rotation` turns to the world. Those of the first body
+  /// are seen from behind.
   SectionView(const PatchSums& patch, Vec3 origin, const Mat3& rotation, bool of_first = false)
       : u0(dot(origin - patch.origin(), patch.u())),
         v0(dot(origin - patch.origin(), patch.v())),
         u(apply_transposed(rotation, patch.u())),
         v(apply_transposed(rotation, patch.v())),
         normal((of_first ? -1.0 : 1.0) * apply_transposed(rotation, patch.normal())) {}
+
+  /// The view of sections about a centre, along the rows of `turn`.
+  SectionView about(Vec3 centre, const Mat3& turn) const {
+    SectionView view;
+    view.u0 = u0 + dot(centre, u), view.v0 = v0 + dot(centre, v);
+    view.u = turn * u, view.v = turn * v, view.normal = turn * normal;
+    return view;
+  }
 
   /// Adds a section by a plane with this unit normal.
   void add(const Section& s, Vec3 plane, PatchSums& patch) const {

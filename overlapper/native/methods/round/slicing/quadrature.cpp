@@ -120,7 +120,8 @@ class Integrating {
       if (part.area.stretched_error(part.integrals.area) > kStretchedAreaError * area_) return kHopeless;
     }
     const double area = of(part.area, part.integrals.area, area_, kAreaError, kAreaTail);
-    // A volume may be accurate long before the chords of its cuts are. What is cut on both sides then does not close.
+    // A volume may be accurate long before the chords of its cuts are. The surface between two pieces then does not
+    // close.
     const double cut = stack_.cuts ? of(part.cut, part.cut_area, cut_area_, kCutError, kAreaTail) : 0;
     return std::max({volume, area, cut});
   }
