@@ -48,16 +48,16 @@ def volume(first: Hull, cuts: np.ndarray) -> Callable[[], float]:
 @lru_cache(1)
 def library() -> Callable[..., float]:
     """The function `r3d_volume`. ImportError if R3D names no folder."""
-    folder = os.environ.get("R3D")
-    if not folder:
+    source = Path(os.environ.get("R3D", "")) / "src" / "r3d.c"
+    if not source.is_file():
         raise ImportError("the variable R3D names no folder with the sources of r3d", name="r3d")
     built = ROOT / "build" / "r3d"
     built.mkdir(parents=True, exist_ok=True)
     # As its Readme recommends for polytopes far from the origin, moments are about a vertex.
     (built / "r3d-config.h").write_text(f"#define R3D_MAX_VERTS {MOST}\n#define SHIFT_POLY\n")
-    sources = [Path(folder) / "src" / "r3d.c", Path(__file__).with_name("r3d_volume.c")]
+    sources = [source, Path(__file__).with_name("r3d_volume.c")]
     path = built / f"r3d.{os.getpid()}.so"  # processes that start together do not overwrite each other's
-    include = [f"-I{built}", f"-I{Path(folder) / 'src'}"]
+    include = [f"-I{built}", f"-I{source.parent}"]
     subprocess.run(["cc", *OPTIONS, "-shared", "-fPIC", *include, *sources, "-o", path, "-lm"], check=True)
     ask = ctypes.CDLL(str(path)).r3d_volume
     path.unlink()

@@ -262,8 +262,9 @@ def test_halfspaces_find_the_volume_of_hulls_in_general_position():
         assert peers.HardCase("volume", "scipy")(*bodies) == pytest.approx(truth, rel=1e-9)
 
 
-def test_r3d_is_missing_where_no_folder_is_named(monkeypatch):
-    monkeypatch.delenv("R3D", raising=False)
+@pytest.mark.parametrize("folder", ["", "/nowhere"])
+def test_r3d_is_missing_where_no_folder_with_it_is_named(folder, monkeypatch):
+    monkeypatch.setenv("R3D", folder)
     with pytest.raises(ImportError, match=r"^the variable R3D names no folder with the sources of r3d$"):
         peers.HardCase("volume", "r3d")(*DEEP.bodies)
 
