@@ -1,4 +1,4 @@
-"""MuJoCo: the time of overlaps beside mj_step, and the depths of mj_geomDistance beside ours.
+"""MuJoCo: the time of overlaps beside mj_step, the pairs that overlap in packages' models, and depths beside ours.
 
     python benchmarks mujoco                 all, some minutes, then the page
     python benchmarks mujoco --cases 20      fewer poses of each pair of types
@@ -6,8 +6,8 @@
 
 In every step mj_step and this package are called in turn, on one processor, and the time is that of the processor, so
 that other processes do not count. Every volume is compared with that of a call for its pair alone: if one differs by
-more than rounding, the run ends. dm_control's models are measured if dm_control is installed. Writes mujoco.csv to
-benchmarks/results/MACHINE, and the page docs/mujoco_benchmarks.md.
+more than rounding, the run ends. Models of dm_control and of other packages are measured if the packages are installed.
+Writes mujoco.csv to benchmarks/results/MACHINE, and the page docs/mujoco_benchmarks.md.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from harness.timing import Stopwatch, on_one_processor, quartiles
 from overlapper import Overlaps, overlap
 from overlapper.mujoco import Bodies
 from overlapper.reference import Mujoco
+from speed.engine_models import PACKAGES, model_figures
 
 RESULTS = results.of_machine("mujoco.csv")
 PAGE = "speed.engine_page"
@@ -157,12 +158,14 @@ def options(parser: ArgumentParser) -> None:
 def measure(chosen: Namespace, path: Path) -> None:
     on_one_processor()
     load = f"load {os.getloadavg()[0]:.1f} at the start"
-    with results.writing(
-        path, COLUMNS, f"{results.today()}; {results.packages('mujoco', 'dm_control')}; {load}"
-    ) as write:
+    with results.writing(path, COLUMNS, f"{results.today()}; {results.packages('mujoco', *PACKAGES)}; {load}") as write:
         for name, model in models():
             write(("steps", name, column, f"{value:.4g}") for column, value in step_figures(name, model).items())
             print(f"{name}: measured", flush=True)
+        for package in PACKAGES:
+            counts = model_figures(package)
+            write(("models", package, column, value) for column, value in (counts or {}).items())
+            print(f"{package}: {'compared' if counts else 'not installed, its models are left out'}", flush=True)
         for kinds in combinations_with_replacement(TYPES, 2):
             if kinds == ("plane", "plane"):
                 continue

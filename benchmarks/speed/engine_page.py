@@ -1,4 +1,4 @@
-"""The page about MuJoCo's times and depths, docs/mujoco_benchmarks.md, from the results file."""
+"""The page about MuJoCo's times, pairs and depths, docs/mujoco_benchmarks.md, from the results file."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from pathlib import Path
 from harness import results
 from harness.page import duration, indented, named, table, write
 from speed.engine import SAMPLES, SETTLING
+from speed.engine_models import POSES, TOUCHING
 
 COUNTS = ("overlapping", "agree", "ours", "mujoco", "undecided", "shallow")
+MODEL_COUNTS = ("models", "poses", "pairs", "ours", "theirs", "touching")
 
 Figures = dict[str, dict[str, float]]  # by row and column
 
@@ -16,7 +18,7 @@ Figures = dict[str, dict[str, float]]  # by row and column
 def read(path: Path) -> tuple[list[str], dict[str, Figures]]:
     """The notes of a results file, and its tables by name."""
     notes, rows = results.read(path)
-    found: dict[str, Figures] = {"steps": {}, "distances": {}}
+    found: dict[str, Figures] = {"steps": {}, "models": {}, "distances": {}}
     for row in rows:
         found[row["table"]].setdefault(row["row"], {})[row["column"]] = float(row["value"])
     return notes, found
@@ -24,13 +26,13 @@ def read(path: Path) -> tuple[list[str], dict[str, Figures]]:
 
 def write_page(path: Path, folder: Path) -> Path:
     notes, found = read(path)
-    steps, distances = found["steps"], found["distances"]
+    steps, models, distances = found["steps"], found["models"], found["distances"]
 
     def a_pair(name: str) -> str:
         return duration(steps[name]["overlaps"] / steps[name]["overlapping"])
 
-    def total(column: str) -> int:
-        return round(sum(figures[column] for figures in distances.values()))
+    def total(column: str, of: Figures = distances) -> int:
+        return round(sum(figures[column] for figures in of.values()))
 
     times = [
         [
@@ -52,6 +54,8 @@ def write_page(path: Path, folder: Path) -> Path:
         ]
         for kinds, figures in distances.items()
     ]
+    packages = [[name, *(f"{figures[column]:,.0f}" for column in MODEL_COUNTS)] for name, figures in models.items()]
+    packages.append(["**all**", *(f"**{total(column, models):,}**" for column in MODEL_COUNTS)])
     heading = ["pair", "overlap", "agree", "ours nearer", "MuJoCo nearer", "undecided", "too shallow"]
     return write(
         Path(__file__).with_suffix(".md"),
@@ -59,11 +63,15 @@ def write_page(path: Path, folder: Path) -> Path:
         results=named(path),
         notes=indented(notes),
         times=table(["model", "geoms", "overlaps", "`mj_step`", "`update()`", "again", "`overlaps()`", "ratio"], times),
+        models=table(["package", "models", "poses", "both", "only ours", "only MuJoCo's", "touching"], packages),
         depths=table([*heading, "depth differs by, m", "`contact.dist` differs by, m"], depths),
         capsules=a_pair("100 capsules"),
         boxes=a_pair("100 boxes"),
         settling=SETTLING,
         samples=SAMPLES,
+        poses=POSES,
+        touching=f"{TOUCHING:g}",
+        left_out=total("skipped", models),
         cases=f"{max(figures['cases'] for figures in distances.values()):.0f}",
         overlapping=f"{total('overlapping'):,}",
         sides=total("sides"),

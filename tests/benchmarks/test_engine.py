@@ -1,4 +1,4 @@
-"""The benchmark of MuJoCo: its page has all models and types, and a wrong volume ends the run."""
+"""The benchmark of MuJoCo: its page has all models, packages and types, and a wrong volume ends the run."""
 
 from types import SimpleNamespace
 
@@ -9,7 +9,7 @@ from harness import command, results
 mujoco = pytest.importorskip("mujoco")
 
 from overlapper.mujoco import Bodies  # noqa: E402
-from speed import engine, engine_page  # noqa: E402
+from speed import engine, engine_models, engine_page  # noqa: E402
 
 
 @pytest.fixture
@@ -19,6 +19,7 @@ def small(monkeypatch):
     monkeypatch.setattr(engine, "on_one_processor", lambda: None)
     monkeypatch.setattr(engine, "GRIDS", {name: engine.GRIDS[name] for name in ("100 boxes", "100 capsules")})
     monkeypatch.setattr(engine, "TYPES", ("plane", "capsule", "box"))
+    monkeypatch.setattr(engine_models, "find_spec", lambda name: None)
 
 
 def test_the_page_has_times_and_depths(small, tmp_path, monkeypatch, capsys):
@@ -42,6 +43,24 @@ def test_the_models_of_dm_control_are_measured_if_it_is_installed(small, tmp_pat
     spec = SimpleNamespace(submodule_search_locations=[str(tmp_path)])
     monkeypatch.setattr(engine, "find_spec", lambda name: spec)
     assert [name for name, _ in engine.models()][:3] == [f"dm_control's {name}" for name in engine.SUITE]
+
+
+def test_the_pairs_of_the_models_of_a_package_are_counted(tmp_path, monkeypatch):
+    ball = "<body pos='{}'><freejoint/><geom size='.1'/></body>"
+    body = f"<geom type='plane' size='1 1 1'/>{ball.format('0 0 .05')}{ball.format('1 0 .1')}{ball.format('2 0 1')}"
+    (tmp_path / "model.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    (tmp_path / "part.xml").write_text("<mujocoinclude/>")
+    (tmp_path / "other.xml").write_text("<robot/>")
+    spec = SimpleNamespace(submodule_search_locations=[str(tmp_path)])
+    monkeypatch.setattr(engine_models, "find_spec", lambda name: spec if name == "robots" else None)
+    monkeypatch.setattr(engine_models, "POSES", 1)
+    counts = engine_models.model_figures("robots")
+    assert counts == {"models": 1, "poses": 1, "pairs": 1, "ours": 0, "theirs": 0, "touching": 0, "skipped": 0}
+    assert engine_models.model_figures("others") is None
+    # A pair that only one side has is counted on that side.
+    monkeypatch.setattr(engine_models, "contact_depths", lambda data: {(0, 3): 0.5, (1, 2): 1e-12})
+    counts = engine_models.model_figures("robots")
+    assert (counts["pairs"], counts["ours"], counts["theirs"], counts["touching"]) == (0, 1, 1, 1)
 
 
 def test_a_volume_that_is_not_that_of_a_single_call_ends_the_run(small, tmp_path, monkeypatch, capsys):
