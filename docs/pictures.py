@@ -59,6 +59,7 @@ MAKERS = (
         *("forces_energy.png", "forces_friction.png"),
         by=("forces/page",),
     ),
+    of_results("engines", "*/engines.csv", "engines.png", by=("forces/engines_page",)),
     of_results("round", "*/round.csv", "round.png", by=("speed/round_page",)),
     of_results("steps", "*/steps.csv", "steps.png", by=("speed/steps_page",)),
     of_results(

@@ -25,6 +25,7 @@ COMMANDS = {
     "stress": "stability.stress",
     "graded": "stability.graded",
     "physics": "forces.physics",
+    "engines": "forces.engines",
     "forces": "forces.cost",
     "firsttry": "forces.firsttry",
     "boxes": "boxes.iou",
