@@ -2,6 +2,7 @@
 
 import importlib.util
 import signal
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -25,8 +26,18 @@ HERE = Path(__file__).parent
 collect_ignore = [] if importlib.util.find_spec("torch") else ["with_torch"]
 
 
-def pytest_collection_modifyitems(items):
-    """Turns off line coverage for tests of the core: it would slow down their exact arithmetic by a half."""
+def pytest_addoption(parser):
+    parser.addoption("--every", type=int, default=1, help="run only each N-th case of a parametrized test")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Keeps each N-th case, and turns off coverage for tests of the core: it slows down exact arithmetic by a half."""
+    seen = Counter()
+    for item in list(items):
+        test = item.nodeid.partition("[")[0]
+        if seen[test] % config.getoption("every"):
+            items.remove(item)
+        seen[test] += 1
     for item in items:
         if item.path.is_relative_to(HERE / "native") or item.path.is_relative_to(HERE / "support"):
             item.add_marker("no_cover")
