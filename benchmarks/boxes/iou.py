@@ -1,6 +1,7 @@
 """IoU of oriented boxes: errors and times of this package beside pytorch3d, scipy, shapely and Monte Carlo.
 
     python benchmarks boxes
+    python benchmarks boxes --all      all figures of the page: a million pairs and AVX2, too
 
 pytorch3d needs torch. `make test-torch` makes an environment with torch, in build/torch. Use its Python in the place of
 `python`, after the following. easypytorch3d 0.7.9.post1 is compiled for torch 2.11 and does not load with 2.15.
@@ -11,8 +12,9 @@ pytorch3d needs torch. `make test-torch` makes an environment with torch, in bui
 
 from __future__ import annotations
 
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from statistics import median
@@ -21,7 +23,7 @@ import numpy as np
 import shapely
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from harness.command import Wrong
+from harness.command import COMMANDS, Wrong, parser_of
 from harness.results import of_machine, today, writing
 from harness.timing import in_turn, on_one_processor
 from overlapper import arrays, overlap
@@ -222,6 +224,10 @@ def times(rng: np.random.Generator) -> list[tuple[str, str, str, float]]:
     return rows
 
 
+def options(parser: ArgumentParser) -> None:
+    parser.add_argument("--all", action="store_true", help="measure a million pairs and AVX2, too")
+
+
 def measure(chosen: Namespace, path: Path) -> None:
     on_one_processor()
     rng = np.random.default_rng(0)
@@ -232,3 +238,6 @@ def measure(chosen: Namespace, path: Path) -> None:
     with writing(path, ("part", "name", "figure", "value"), note) as write:
         for part in (errors(rng), published(), times(rng)):
             write(part)
+    for name in ("million", "vectors") if chosen.all else ():
+        module = import_module(COMMANDS[name])
+        module.measure(parser_of(name, module).parse_args([]), path.with_name(module.RESULTS.name))

@@ -41,6 +41,24 @@ def test_pairs_of_the_million_are_proved():
         assert found["off"] < 1e-12 and 0 < found["stated"] <= 1e-12
 
 
+def test_one_command_measures_all_figures_of_the_page(tmp_path, monkeypatch):
+    for name in ("errors", "times"):
+        monkeypatch.setattr(iou, name, lambda rng: [("times", "street", "ours", 1.0)])
+    monkeypatch.setattr(iou, "published", list)
+    monkeypatch.setattr(iou, "version", lambda name: "1.0")
+    asked = []
+    for module in (iou, million, vectors):
+        monkeypatch.setattr(module, "on_one_processor", lambda: None)
+    for module in (million, vectors):
+        monkeypatch.setattr(module, "measure", lambda chosen, path: asked.append((vars(chosen), path)))
+    iou.measure(Namespace(all=False), tmp_path / "boxes.csv")
+    assert not asked
+    iou.measure(Namespace(all=True), tmp_path / "boxes.csv")
+    assert [path.name for _, path in asked] == ["million_boxes.csv", "vectors.csv"]
+    assert asked[0][0]["pairs"] == 50_000 and asked[1][0]["rounds"] == 15
+    assert len(results.read(tmp_path / "boxes.csv")[1]) == 2
+
+
 def test_volumes_without_avx2_have_the_same_bits(tmp_path, monkeypatch):
     monkeypatch.setattr(vectors, "on_one_processor", lambda: None)
     vectors.measure(Namespace(rounds=2), tmp_path / "vectors.csv")
