@@ -574,6 +574,21 @@ class Errors:
         """
 
     @property
+    def centroid_gradient(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), writable=False)]:
+        """
+        (m, 3, 6) 1 and m, for each entry. NaN where there is no derivative. Infinite for bodies that touch,
+        and where the error of the volume is as large as the volume. Computed on each access.
+
+        Where facets of two bodies lie in one plane, derivatives are one-sided, and the bound is as large as both sides are apart.
+        """
+
+    @property
+    def centroid_shape_gradient(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), writable=False)]:
+        """
+        (m, 3, 3) without unit, for each entry, as `centroid_gradient`. Computed on each access.
+        """
+
+    @property
     def vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]:
         """
         For each body, (k,) m²: bounds of the lengths of the errors of the rows; None for other bodies than hulls and rounded
@@ -745,7 +760,7 @@ class Overlap:
         a body has the derivatives of coordinate j. 1 and m. The translations of all bodies add up to the identity. Where faces of
         boxes, hulls and half-spaces lie in one plane, derivatives are one-sided, as those of `gradient`. NaN for a pair with a round
         body if surfaces coincide, or touch along a line, and for contacts so shallow that rounding hides where surfaces cross. NaN also
-        for three or more bodies with a round body. Zeros unless overlapping.
+        for three or more bodies with a round body. Zeros unless overlapping. `errors.centroid_gradient` bounds the errors.
         """
 
     @property
@@ -754,7 +769,7 @@ class Overlap:
         (m, 3, 3) d centroid / d (size) of each body, by the numbers of `shape_gradient`: half extents, radius and length, half
         axes, or the offset of a half-space, then zeros. Row j of a body has the derivatives of coordinate j. Without unit. NaN for
         hulls, for the length 0 of a capsule, and where `centroid_gradient` is NaN. Zeros unless
-        overlapping.
+        overlapping. `errors.centroid_shape_gradient` bounds the errors.
         """
 
     @property

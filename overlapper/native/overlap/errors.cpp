@@ -360,14 +360,8 @@ double apart(const Mat3& a, const Mat3& b) {
       {max_component(abs(a.row0 - b.row0)), max_component(abs(a.row1 - b.row1)), max_component(abs(a.row2 - b.row2))});
 }
 
-/// m²: upper bound of the squared distance R² of the points of a convex set from its centroid.
-///
-/// The centroid of a solid is at least a quarter of the width from either side, so the set is at least w = 4 R / 3 wide
-/// along the line to its farthest point. ∫ x² dV along a line is least for a double cone: w² / 40 of the volume. So V
-/// R² is at most 45 / 2 of ∫ |x|² dV, which is half of the trace.
 double most_distance2(const MeasuresAndInertia& values) {
-  const Mat3& i = *values.inertia;
-  return 45.0 / 4 * (i.row0.x + i.row1.y + i.row2.z) / values.measures.volume;
+  return most_distance2(*values.inertia, values.measures.volume);
 }
 
 /// The box around the smallest body.
@@ -410,7 +404,7 @@ StatedWithErrors measured_with_errors(const Region& region, std::span<const Plac
   const double force = sandwich.doubtful_area() + (between + kSums) * m.area;
   for (const Placed& body : bodies)
     errors.gradient.push_back({force, force * (norm(m.centroid - body.position) + radius)});
-  return {stated_of(values, bodies.size()), std::move(errors)};
+  return {stated_of(values, bodies.size()), std::move(errors), displaced, radius};
 }
 
 double error_of_vertices(const Region& region, const Boundary& boundary, std::span<const Placed> bodies) {
@@ -460,6 +454,10 @@ Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, 
 
 double error_of_integrated_inertia(const MeasuresAndInertia& values, const Spread& spread) {
   return (4 * values.measures.volume_error + spread.volume) * most_distance2(values) + values.inertia_error;
+}
+
+double most_distance2(const Mat3& inertia, double volume) {
+  return 45.0 / 4 * (inertia.row0.x + inertia.row1.y + inertia.row2.z) / volume;
 }
 
 double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b) {

@@ -31,6 +31,8 @@ struct Stated {
 struct StatedWithErrors {
   Stated stated;
   Errors errors;
+  double displaced = 0;  ///< m: errors.centroid without the last bits of world coordinates
+  double radius = 0;     ///< m: upper bound of the distance of points from the centroid
 };
 
 /// The measures of a region, and how far they may be from those of the common set.
@@ -68,6 +70,13 @@ Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, 
 /// volume. The inertia has a higher degree: there the factor is four. No part of that change is farther from the
 /// centroid than the farthest point of the common set.
 double error_of_integrated_inertia(const MeasuresAndInertia& values, const Spread& spread);
+
+/// m²: upper bound of the squared distance R² of the points of a convex set from its centroid.
+///
+/// The centroid of a solid is at least a quarter of the width from either side, so the set is at least w = 4 R / 3 wide
+/// along the line to its farthest point. ∫ x² dV along a line is least for a double cone: w² / 40 of the volume. So V
+/// R² is at most 45 / 2 of ∫ |x|² dV, which is half of the trace.
+double most_distance2(const Mat3& inertia, double volume);
 
 /// m: the largest distance of a point of either cloud from the nearest point of the other. Infinite if there are too
 /// many points to compare.

@@ -53,9 +53,10 @@ class Overlap {
   bool widened() const;        ///< true if doubles were not accurate enough
   int facets_touched() const;  ///< number of planes in the measures
 
-  /// The polytope of the common set. This and the next four are only for overlapping bodies.
+  /// The polytope of the common set. This and the next five are only for overlapping bodies.
   const Region& region() const;
-  const Region& drawn() const;  ///< of the boundary: the finest if doubles do not place planes well enough
+  const Region& drawn() const;          ///< of the boundary: the finest if doubles do not place planes well enough
+  const Region& finest_region() const;  ///< for error bounds
   const Measures& measures() const;
   /// Inertia tensor about the centroid, unit density; by slices if the measures have closed forms.
   Mat3 inertia() const;
@@ -114,7 +115,6 @@ class Overlap {
   Patch patch_of_overlap(const std::optional<Vec3>& direction) const;
   OverlappingBodies overlapping_bodies() const;
   MeasuresAndInertia measured_in_full() const;
-  const Region& finest_region() const;
   Stated stated() const;
   const Overlap& judge_of_paper() const;
   Errors errors_of_paper() const;

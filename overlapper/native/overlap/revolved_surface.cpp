@@ -12,6 +12,7 @@ namespace {
 void add(SurfaceSums& sums, double weight, const SurfaceSums& more) {
   sums.distance += weight * more.distance, sums.moment += weight * more.moment;
   sums.by_radius += weight * more.by_radius, sums.by_length += weight * more.by_length;
+  sums.area += weight * more.area;
 }
 
 /// Coordinates q are those of the body, about its position, divided by the half axes of an ellipsoid.
@@ -194,6 +195,7 @@ class RevolvedSurface {
     const double distance = scale_.x * scale_.y * scale_.z * area * dot(q, normal);
     sums.distance += distance, sums.moment += distance * x;
     sums.by_radius += area * x, sums.by_length += area / 2 * std::abs(dot(axis_, normal)) * x;
+    sums.area += area;
   }
 
   Mat3 rotation_;

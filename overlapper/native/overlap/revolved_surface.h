@@ -20,6 +20,7 @@ struct SurfaceSums {
   Vec3 moment;          ///< ∫ x (x · n) dA
   Vec3 by_radius;       ///< ∫ x dA; not for an ellipsoid
   Vec3 by_length;       ///< ∫ x |n_z| / 2 dA; not for an ellipsoid
+  double area = 0;      ///< m²; not for an ellipsoid
 };
 
 /// The sums for a ball, an ellipsoid, a capsule or a cylinder. `inside` is a point inside both bodies.

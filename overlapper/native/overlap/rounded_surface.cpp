@@ -23,6 +23,7 @@ class RoundedSurface {
   void add_face(const FacetSection& face) {
     const double distance = dot(face.normal, face.first);
     sums_.distance += distance, sums_.moment += distance / face.area * face.first, sums_.by_radius += face.first;
+    sums_.area += face.area;
   }
 
   void add_seam(const BorderNode& node) {
@@ -102,7 +103,7 @@ class RoundedSurface {
 
   void add_point(Vec3 x, Vec3 normal, double area) {
     const double distance = area * dot(x, normal);
-    sums_.distance += distance, sums_.moment += distance * x, sums_.by_radius += area * x;
+    sums_.distance += distance, sums_.moment += distance * x, sums_.by_radius += area * x, sums_.area += area;
   }
 
   const HullData& hull_;
@@ -118,7 +119,7 @@ SurfaceSums rounded_surface(const Overlap& overlap, int body, Vec3 inside, std::
                             std::span<const BorderNode> rims) {
   const Placed& rounded = overlap.bodies()[body];
   constexpr Vec3 kUnknown{kNoDerivative, kNoDerivative, kNoDerivative};
-  if (polytope_of(rounded.shape)->edges.empty()) return {kNoDerivative, kUnknown, kUnknown, {}};
+  if (polytope_of(rounded.shape)->edges.empty()) return {kNoDerivative, kUnknown, kUnknown, {}, kNoDerivative};
   RoundedSurface surface(rounded, inside);
   for (const FacetSection& face : facet_sections(overlap, body, inside)) surface.add_face(face);
   for (const BorderNode& node : border) surface.add_seam(node);

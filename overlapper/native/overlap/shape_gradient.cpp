@@ -25,13 +25,6 @@ double area_of(const Boundary& boundary, int facet) {
 
 Vec3 along(int axis, double value) { return {axis == 0 ? value : 0, axis == 1 ? value : 0, axis == 2 ? value : 0}; }
 
-/// How many numbers describe the size of a shape; a hull has its vertices instead.
-int numbers_of(const Shape& shape) {
-  if (std::holds_alternative<Capsule>(shape) || std::holds_alternative<Cylinder>(shape)) return 2;
-  if (std::holds_alternative<Box>(shape) || std::holds_alternative<Ellipsoid>(shape)) return 3;
-  return std::holds_alternative<Hull>(shape) ? 3 : 1;
-}
-
 std::vector<Vec3> areas_of_sides(const Boundary& boundary, std::span<const Placed> bodies) {
   std::vector<Vec3> areas(bodies.size());
   for (int f = 0; f < static_cast<int>(boundary.planes.size()); ++f) {
@@ -337,6 +330,12 @@ std::vector<Vec3> gradient_of_polyhedra(const Overlap& overlap) {
 int axis_across(const Placed& box, Vec3 normal) {
   const Vec3 local = abs(apply_transposed(box.pose.rotation, normal));
   return local.x >= local.y && local.x >= local.z ? 0 : local.y >= local.z ? 1 : 2;
+}
+
+int numbers_of(const Shape& shape) {
+  if (std::holds_alternative<Capsule>(shape) || std::holds_alternative<Cylinder>(shape)) return 2;
+  if (std::holds_alternative<Box>(shape) || std::holds_alternative<Ellipsoid>(shape)) return 3;
+  return std::holds_alternative<Hull>(shape) ? 3 : 1;
 }
 
 std::vector<Vec3> shape_gradient(const Overlap& overlap) {

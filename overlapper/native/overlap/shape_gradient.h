@@ -15,6 +15,9 @@ inline constexpr double kNoDerivative = std::numeric_limits<double>::quiet_NaN()
 /// The axis of a box that is across a facet with this normal.
 int axis_across(const Placed& box, Vec3 normal);
 
+/// How many numbers describe the size of a shape; a hull has its vertices instead, and counts as three.
+int numbers_of(const Shape& shape);
+
 /// The derivatives of the common volume by the numbers of each body's shape, in the order of its fields.
 ///
 /// - A box has its half extents, a sphere and a rounded hull the radius.

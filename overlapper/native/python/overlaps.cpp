@@ -260,9 +260,10 @@ ValueError
 
 /// A (bodies, 3, columns) array of the derivatives of the centroid.
 template <class T>
-Matrices by_coordinates(const Overlap& o, T CentroidGradient::* part) {
+Matrices by_coordinates(const Overlap& o, std::vector<CentroidGradient> (*of)(const Overlap&),
+                        T CentroidGradient::* part) {
   std::vector<double> values;
-  for (const CentroidGradient& each : computed_of(o.bodies(), [&] { return centroid_gradient(o); })) {
+  for (const CentroidGradient& each : computed_of(o.bodies(), [&] { return of(o); })) {
     const auto* first = reinterpret_cast<const double*>(&(each.*part));
     values.insert(values.end(), first, first + sizeof(T) / sizeof(double));
   }
@@ -271,18 +272,20 @@ Matrices by_coordinates(const Overlap& o, T CentroidGradient::* part) {
 
 void define_centroid_gradient(nb::class_<Overlap>& cls) {
   array_property(
-      cls, "centroid_gradient", [](const Overlap& o) { return by_coordinates(o, &CentroidGradient::pose); },
+      cls, "centroid_gradient",
+      [](const Overlap& o) { return by_coordinates(o, centroid_gradient, &CentroidGradient::pose); },
       R"((m, 3, 6) d centroid / d (translation, rotation vector about the body's own position) of each body, world axes. Row j of
 a body has the derivatives of coordinate j. 1 and m. The translations of all bodies add up to the identity. Where faces of
 boxes, hulls and half-spaces lie in one plane, derivatives are one-sided, as those of `gradient`. NaN for a pair with a round
 body if surfaces coincide, or touch along a line, and for contacts so shallow that rounding hides where surfaces cross. NaN also
-for three or more bodies with a round body. Zeros unless overlapping.)");
+for three or more bodies with a round body. Zeros unless overlapping. `errors.centroid_gradient` bounds the errors.)");
   array_property(
-      cls, "centroid_shape_gradient", [](const Overlap& o) { return by_coordinates(o, &CentroidGradient::shape); },
+      cls, "centroid_shape_gradient",
+      [](const Overlap& o) { return by_coordinates(o, centroid_gradient, &CentroidGradient::shape); },
       R"((m, 3, 3) d centroid / d (size) of each body, by the numbers of `shape_gradient`: half extents, radius and length, half
 axes, or the offset of a half-space, then zeros. Row j of a body has the derivatives of coordinate j. Without unit. NaN for
 hulls, for the length 0 of a capsule, and where `centroid_gradient` is NaN. Zeros unless
-overlapping.)");
+overlapping. `errors.centroid_shape_gradient` bounds the errors.)");
 }
 
 void define_shape_gradient(nb::class_<Overlap>& cls) {
@@ -369,6 +372,16 @@ them much farther than their own size.)");
             std::span<const Vec3>(computed_of(e.overlap.bodies(), [&] { return shape_gradient_errors(e.overlap); })));
       },
       "(m, 3) m², for each entry. NaN where there is no derivative. Computed on each access.");
+  const auto of_centroid = [](auto part) {
+    return [part](const ErrorsOf& e) { return by_coordinates(e.overlap, centroid_gradient_errors, part); };
+  };
+  array_property(cls, "centroid_gradient", of_centroid(&CentroidGradient::pose),
+                 R"((m, 3, 6) 1 and m, for each entry. NaN where there is no derivative. Infinite for bodies that touch,
+and where the error of the volume is as large as the volume. Computed on each access.
+
+Where facets of two bodies lie in one plane, derivatives are one-sided, and the bound is as large as both sides are apart.)");
+  array_property(cls, "centroid_shape_gradient", of_centroid(&CentroidGradient::shape),
+                 "(m, 3, 3) without unit, for each entry, as `centroid_gradient`. Computed on each access.");
   cls.def_prop_ro(
       "vertex_gradients", [](const ErrorsOf& e) { return by_vertices(e.overlap, true); },
       nb::sig("def vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]"),
