@@ -1134,6 +1134,32 @@ class Overlaps:
         """
 
     @property
+    def gradient_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 2, 6) error bounds of `gradient`, m² and m³, as Overlap.errors.gradient. The first use takes some tens of
+        microseconds for each pair of polyhedra, and longer for round bodies.
+        """
+
+    @property
+    def shape_gradient_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 2, 3) error bounds of `shape_gradient`, m², as Overlap.errors.shape_gradient.
+        """
+
+    @property
+    def centroid_gradient_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 2, 3, 6) error bounds of `centroid_gradient`, 1 and m, as Overlap.errors.centroid_gradient. The first use takes
+        some hundreds of microseconds for each pair of polyhedra, and longer for round bodies.
+        """
+
+    @property
+    def centroid_shape_gradient_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 2, 3, 3) error bounds of `centroid_shape_gradient`, as Overlap.errors.centroid_shape_gradient.
+        """
+
+    @property
     def centroid_gradient(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (p, 2, 3, 6) derivatives of the centroid by the poses of a and of b, as Overlap.centroid_gradient; zeros unless

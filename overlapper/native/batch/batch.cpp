@@ -176,9 +176,9 @@ const std::vector<ShapeGradients>& Overlaps::shape_gradients() const {
   });
 }
 
-const DepthGradients& Overlaps::depth_gradients() const {
+const Gradients& Overlaps::depth_gradients() const {
   return depth_gradients_->get([this] {
-    DepthGradients found{std::vector<BodyGradients>(size()), std::vector<ShapeGradients>(size())};
+    Gradients found{std::vector<BodyGradients>(size()), std::vector<ShapeGradients>(size())};
     for (size_t row = 0; row < size(); ++row) {
       if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) continue;
       const DepthGradient one = depth_gradient(*overlap(row));
@@ -188,14 +188,37 @@ const DepthGradients& Overlaps::depth_gradients() const {
   });
 }
 
+CentroidGradients Overlaps::of_centroids(Status least, std::vector<CentroidGradient> (*of)(const Overlap&)) const {
+  CentroidGradients found;
+  found.pose.resize(size()), found.shape.resize(size(), {Mat3{{}, {}, {}}, Mat3{{}, {}, {}}});
+  for (size_t row = 0; row < size(); ++row) {
+    if (status[row] < static_cast<std::int8_t>(least)) continue;
+    const std::vector<CentroidGradient> one = of(*overlap(row));
+    for (int i = 0; i < 2; ++i) found.pose[row][i] = one[i].pose, found.shape[row][i] = one[i].shape;
+  }
+  return found;
+}
+
 const CentroidGradients& Overlaps::centroid_gradients() const {
-  return centroid_gradients_->get([this] {
-    CentroidGradients found;
-    found.pose.resize(size()), found.shape.resize(size(), {Mat3{{}, {}, {}}, Mat3{{}, {}, {}}});
+  return centroid_gradients_->get([this] { return of_centroids(Status::kOverlapping, centroid_gradient); });
+}
+
+const CentroidGradients& Overlaps::centroid_gradient_errors() const {
+  const auto of = overlapper::centroid_gradient_errors;
+  return centroid_gradient_errors_->get([&] { return of_centroids(Status::kTouching, of); });
+}
+
+const Gradients& Overlaps::gradient_errors() const {
+  return gradient_errors_->get([this] {
+    Gradients found{std::vector<BodyGradients>(size()), std::vector<ShapeGradients>(size())};
     for (size_t row = 0; row < size(); ++row) {
-      if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) continue;
-      const std::vector<CentroidGradient> one = centroid_gradient(*overlap(row));
-      for (int i = 0; i < 2; ++i) found.pose[row][i] = one[i].pose, found.shape[row][i] = one[i].shape;
+      if (status[row] == static_cast<std::int8_t>(Status::kSeparated)) continue;
+      const std::shared_ptr<Overlap> of_row = overlap(row);
+      for (int i = 0; i < 2; ++i) {
+        const auto [force, moment] = of_row->errors().gradient[i];
+        found.pose[row][i] = {force, force, force, moment, moment, moment};
+      }
+      std::ranges::copy(shape_gradient_errors(*of_row), found.shape[row].begin());
     }
     return found;
   });

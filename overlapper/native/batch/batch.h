@@ -11,6 +11,7 @@
 
 #include "batch/box_tree.h"
 #include "geometry/once.h"
+#include "overlap/centroid_gradient.h"
 #include "overlap/overlap.h"
 #include "shapes/shape.h"
 
@@ -24,13 +25,14 @@ using BodyGradients = std::array<std::array<double, 6>, 2>;
 
 /// The derivatives of the volume by the numbers of the shapes of a and of b, as in shape_gradient().
 using ShapeGradients = std::array<Vec3, 2>;
-/// The derivatives of depths, a row per pair.
-struct DepthGradients {
+/// The derivatives of a number, or bounds of their errors, a row per pair.
+struct Gradients {
   std::vector<BodyGradients> pose;
   std::vector<ShapeGradients> shape;
 };
 
-/// The derivatives of centroids, a row per pair. Each has a block for a and one for b, and rows for coordinates.
+/// The derivatives of centroids, or bounds of their errors, a row per pair. Each has a block for a and one for b, and
+/// rows for coordinates.
 struct CentroidGradients {
   std::vector<std::array<std::array<std::array<double, 6>, 3>, 2>> pose;
   std::vector<std::array<Mat3, 2>> shape;
@@ -85,22 +87,28 @@ struct Overlaps {
   const Patches& patches() const;
   const std::vector<double>& areas() const;
   const std::vector<ShapeGradients>& shape_gradients() const;
-  const DepthGradients& depth_gradients() const;
+  const Gradients& depth_gradients() const;
   const CentroidGradients& centroid_gradients() const;
+  const Gradients& gradient_errors() const;
+  const CentroidGradients& centroid_gradient_errors() const;
   const std::vector<PoseHessian>& hessians() const;
   /// The patch of a row. It is seen along a unit direction if one is given.
   Patch patch(size_t row, const std::optional<Vec3>& direction = {}) const;
 
  private:
   Placed placed(int body) const;
+  /// `of` the overlap of each row whose status is `least` or more; zeros elsewhere.
+  CentroidGradients of_centroids(Status least, std::vector<CentroidGradient> (*of)(const Overlap&)) const;
 
   template <class T>
   using Shared = std::shared_ptr<Once<T>>;
   Shared<std::vector<double>> areas_ = std::make_shared<Once<std::vector<double>>>();
   Shared<Patches> patches_ = std::make_shared<Once<Patches>>();
   Shared<std::vector<ShapeGradients>> shape_gradients_ = std::make_shared<Once<std::vector<ShapeGradients>>>();
-  Shared<DepthGradients> depth_gradients_ = std::make_shared<Once<DepthGradients>>();
+  Shared<Gradients> depth_gradients_ = std::make_shared<Once<Gradients>>();
   Shared<CentroidGradients> centroid_gradients_ = std::make_shared<Once<CentroidGradients>>();
+  Shared<Gradients> gradient_errors_ = std::make_shared<Once<Gradients>>();
+  Shared<CentroidGradients> centroid_gradient_errors_ = std::make_shared<Once<CentroidGradients>>();
   Shared<std::vector<PoseHessian>> hessians_ = std::make_shared<Once<std::vector<PoseHessian>>>();
 };
 

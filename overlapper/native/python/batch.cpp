@@ -242,13 +242,34 @@ void define_column(nb::class_<Overlaps>& cls, const Column<T>& column) {
   define_column<T>(cls, column.name, values, column.doc);
 }
 
+/// The values of a column that is a member of what an Overlaps computes on first use.
+template <class Table, class T>
+auto lazy_column(const Table& (Overlaps::*compute)() const, std::vector<T> Table::* member) {
+  return [compute, member](const Overlaps& overlaps) -> const auto& {
+    return unlocked([&]() -> const Table& { return (overlaps.*compute)(); }).*member;
+  };
+}
+
 template <class T>
 void define_patch_column(nb::class_<Overlaps>& cls, const char* name, std::vector<T> Overlaps::Patches::* member,
                          const char* doc) {
-  const auto values = [member](const Overlaps& overlaps) -> const auto& {
-    return unlocked([&]() -> const Overlaps::Patches& { return overlaps.patches(); }).*member;
-  };
-  define_column<T>(cls, name, values, doc);
+  define_column<T>(cls, name, lazy_column(&Overlaps::patches, member), doc);
+}
+
+void define_errors_of_gradients(nb::class_<Overlaps>& cls) {
+  define_column<BodyGradients>(
+      cls, "gradient_error", lazy_column(&Overlaps::gradient_errors, &Gradients::pose),
+      R"((p, 2, 6) error bounds of `gradient`, m² and m³, as Overlap.errors.gradient. The first use takes some tens of
+microseconds for each pair of polyhedra, and longer for round bodies.)");
+  define_column<ShapeGradients>(cls, "shape_gradient_error", lazy_column(&Overlaps::gradient_errors, &Gradients::shape),
+                                "(p, 2, 3) error bounds of `shape_gradient`, m², as Overlap.errors.shape_gradient.");
+  define_column<std::array<std::array<std::array<double, 6>, 3>, 2>>(
+      cls, "centroid_gradient_error", lazy_column(&Overlaps::centroid_gradient_errors, &CentroidGradients::pose),
+      R"((p, 2, 3, 6) error bounds of `centroid_gradient`, 1 and m, as Overlap.errors.centroid_gradient. The first use takes
+some hundreds of microseconds for each pair of polyhedra, and longer for round bodies.)");
+  define_column<std::array<Mat3, 2>>(
+      cls, "centroid_shape_gradient_error", lazy_column(&Overlaps::centroid_gradient_errors, &CentroidGradients::shape),
+      "(p, 2, 3, 3) error bounds of `centroid_shape_gradient`, as Overlap.errors.centroid_shape_gradient.");
 }
 
 void define_columns(nb::class_<Overlaps>& cls) {
@@ -279,30 +300,20 @@ hundreds of microseconds for each.)");
       R"((p, 2, 3) derivatives of the volume by the sizes of a and of b, m², as Overlap.shape_gradient; zeros unless
 overlapping. The first use takes some microseconds for each pair of polyhedra.)");
   define_column<BodyGradients>(
-      cls, "depth_gradient",
-      [](const Overlaps& overlaps) -> const auto& {
-        return unlocked([&]() -> const DepthGradients& { return overlaps.depth_gradients(); }).pose;
-      },
+      cls, "depth_gradient", lazy_column(&Overlaps::depth_gradients, &Gradients::pose),
       R"((p, 2, 6) derivatives of the depth by the poses of a and of b, as Overlap.depth_gradient; zeros unless
 overlapping. The first use takes some microseconds for each pair.)");
   define_column<ShapeGradients>(
-      cls, "depth_shape_gradient",
-      [](const Overlaps& overlaps) -> const auto& {
-        return unlocked([&]() -> const DepthGradients& { return overlaps.depth_gradients(); }).shape;
-      },
+      cls, "depth_shape_gradient", lazy_column(&Overlaps::depth_gradients, &Gradients::shape),
       R"((p, 2, 3) derivatives of the depth by the sizes of a and of b, as Overlap.depth_shape_gradient; zeros unless
 overlapping.)");
-  const auto of_centroid = [](auto member) {
-    return [member](const Overlaps& overlaps) -> const auto& {
-      return unlocked([&]() -> const CentroidGradients& { return overlaps.centroid_gradients(); }).*member;
-    };
-  };
+  define_errors_of_gradients(cls);
   define_column<std::array<std::array<std::array<double, 6>, 3>, 2>>(
-      cls, "centroid_gradient", of_centroid(&CentroidGradients::pose),
+      cls, "centroid_gradient", lazy_column(&Overlaps::centroid_gradients, &CentroidGradients::pose),
       R"((p, 2, 3, 6) derivatives of the centroid by the poses of a and of b, as Overlap.centroid_gradient; zeros unless
 overlapping. The first use takes some tens of microseconds for each pair of polyhedra, and longer for round bodies.)");
   define_column<std::array<Mat3, 2>>(
-      cls, "centroid_shape_gradient", of_centroid(&CentroidGradients::shape),
+      cls, "centroid_shape_gradient", lazy_column(&Overlaps::centroid_gradients, &CentroidGradients::shape),
       R"((p, 2, 3, 3) derivatives of the centroid by the sizes of a and of b, as Overlap.centroid_shape_gradient; zeros
 unless overlapping.)");
   define_column<PoseHessian>(

@@ -12,7 +12,7 @@ from pairs_of_kinds import KINDS, PAIRS
 from scipy.spatial.transform import Rotation
 from strategies import quaternion
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap, random_polytope
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap, overlaps, random_polytope
 
 FLAT = {"box", "half-space", "hull"}
 FINE = 400  # bits behind the point: lengths are integers times 2^-400
@@ -268,3 +268,24 @@ def test_errors_of_method_paper_hold_the_difference_from_auto():
     off = np.abs(paper.centroid_gradient - auto.centroid_gradient)
     assert (off <= paper.errors.centroid_gradient).all()
     assert_allclose(paper.errors.centroid_gradient, auto.errors.centroid_gradient + off, rtol=1e-6)
+
+
+def test_rows_of_a_batch_have_the_errors_of_their_overlaps():
+    rng = np.random.default_rng(4)
+    shapes = [
+        Box((1, 0.5, 0.7)),
+        Hull(random_polytope(20, rng=rng).vertices),
+        Sphere(0.8),
+        Box((1, 1, 1)),
+        Box((1, 1, 1)),
+    ]
+    positions = np.r_[rng.uniform(-0.3, 0.3, (3, 3)), [[9, 0, 0], [11, 0, 0]]]
+    turns = np.r_[[quaternion(rng) for _ in range(3)], [[0, 0, 0, 1]] * 2]
+    found = overlaps(shapes, positions, turns, pairs=[(0, 1), (0, 2), (3, 4), (0, 3)])
+    assert [found[row].status for row in range(4)] == ["overlapping", "overlapping", "touching", "separated"]
+    for name in ("gradient", "shape_gradient", "centroid_gradient", "centroid_shape_gradient"):
+        column = getattr(found, name + "_error")
+        assert column.shape == getattr(found, name).shape
+        for row in range(4):
+            assert np.array_equal(column[row], getattr(found[row].errors, name), equal_nan=True)
+        assert np.array_equal(getattr(found[[1, 0]], name + "_error"), column[[1, 0]], equal_nan=True)
