@@ -596,6 +596,14 @@ class Errors:
         """
 
     @property
+    def centroid_vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]:
+        """
+        For each body, (k,) without unit: bounds of the errors of all nine entries of a vertex; None for other bodies than
+        hulls and rounded hulls. NaN where there is no derivative. Infinite for bodies that touch, and where the error of the volume is as large as the
+        volume. Computed on each access.
+        """
+
+    @property
     def depth(self) -> float | None:
         """
         m. None for three or more bodies. The same holds for `distance` and `witnesses`.
@@ -768,8 +776,18 @@ class Overlap:
         """
         (m, 3, 3) d centroid / d (size) of each body, by the numbers of `shape_gradient`: half extents, radius and length, half
         axes, or the offset of a half-space, then zeros. Row j of a body has the derivatives of coordinate j. Without unit. NaN for
-        hulls, for the length 0 of a capsule, and where `centroid_gradient` is NaN. Zeros unless
+        hulls, for the length 0 of a capsule, and where `centroid_gradient` is NaN. Hulls have `centroid_vertex_gradients`. Zeros unless
         overlapping. `errors.centroid_shape_gradient` bounds the errors.
+        """
+
+    @property
+    def centroid_vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]:
+        """
+        For each body, the (k, 3, 3) d centroid / d (position of a vertex), world axes, without unit, of the rows of
+        `Hull.vertices`; None for other bodies than hulls and rounded hulls. Row j of a vertex has the derivatives of coordinate j. The vertices of
+        a body have the sum centroid_gradient[i, :, :3]. Facets of more than three corners count as in `vertex_gradients`. NaN for
+        rounded hulls, and for three or more bodies with a round body. Zeros unless overlapping. `errors.centroid_vertex_gradients`
+        bounds the errors.
         """
 
     @property

@@ -55,7 +55,13 @@ class OtherBody {
     pieces::add_planar_part(own, across, *pieces_, found);
     const double scale = stretch.area(rounded(across));
     found.error += found.rim * (misplaced + pieces_->misplaced()) / std::min({h.x, h.y, h.z});
-    return {scale * found.area, scale * (body_.pose.rotation * scaled(h, found.first)), scale * found.error, 0};
+    const Mat3 sizes{{h.x, 0, 0}, {0, h.y, 0}, {0, 0, h.z}}, map = body_.pose.rotation * sizes;
+    const Mat3 second = map * found.second * transposed(map);
+    return {scale * found.area,
+            scale * (map * found.first),
+            {scale * second.row0, scale * second.row1, scale * second.row2},
+            scale * found.error,
+            0};
   }
 
  private:
@@ -83,7 +89,7 @@ std::vector<FacetSection> facet_sections(const Overlap& overlap, int body, Vec3 
     cancellation_point();
     if (!within.reaches(polygon)) return;
     const PlanarPart part = within.part(polygon, normal, misplaced);
-    if (part.area > 0) found.push_back({corners, rounded(normal), part.area, part.first, part.error});
+    if (part.area > 0) found.push_back({corners, rounded(normal), part.area, part.first, part.second, part.error});
   };
   const auto place = [&](const WideVector& local) { polygon.push_back(position + rotation * local); };
   if (const HullData* hull = polytope_of(flat.shape)) {

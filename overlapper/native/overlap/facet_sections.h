@@ -13,8 +13,9 @@ struct FacetSection {
   std::array<int, 3> corners;  ///< of a hull: the triangle of its facet's fan
   Vec3 normal;
   double area = 0;
-  Vec3 first;        ///< ∫ x dA, about the reference
-  double error = 0;  ///< m², of the area
+  Vec3 first;               ///< ∫ x dA, about the reference
+  Mat3 second{{}, {}, {}};  ///< ∫ x xᵀ dA
+  double error = 0;         ///< m², of the area
 };
 
 /// The parts of all facets of a body of a pair that overlaps. One of the bodies is round. Coordinates are about

@@ -6,10 +6,17 @@
 
 namespace overlapper {
 
-/// The derivatives of the common volume by the vertices of one hull.
+/// The derivatives of the common volume and of its centroid by the vertices of one hull.
 struct VertexGradient {
-  std::vector<Vec3> by_vertex;  ///< m², for each vertex of HullData
-  std::vector<double> error;    ///< m²: bound of the length of the error of each; empty unless wanted
+  std::vector<Vec3> by_vertex;         ///< m², for each vertex of HullData
+  std::vector<double> error;           ///< m²: bound of the length of the error of each; empty unless wanted
+  std::vector<Mat3> centroid;          ///< row j: of coordinate j; empty unless wanted
+  std::vector<double> centroid_error;  ///< bound of the error of each entry; empty unless wanted
+};
+
+/// What vertex_gradients() finds apart from the derivatives of the volume.
+struct Wanted {
+  bool errors = false, centroid = false;
 };
 
 /// For each body, the derivatives by the vertices of its hull, or of the core of a rounded hull. No vertices for
@@ -29,6 +36,11 @@ struct VertexGradient {
 /// Corners may be misplaced, as bounded by Errors::vertices. They change a coordinate by that distance over the height
 /// of the triangle. All vertices together have the area vector of the body's part; the difference counts. Other ways to
 /// fold a facet are not in the errors.
-std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, bool with_errors);
+///
+/// Let λ be the coordinate of a vertex, and x the place about the centroid C. The volume V and C then change by V dC =
+/// ∫ x λ n · dv dA. On a facet, the integrand has the second degree. Rounded hulls have no such sums yet: NaN. So have
+/// groups with a round body. The errors are those of the volume's derivative times the distance of the farthest point,
+/// plus what an error of the centroid moves.
+std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, Wanted wanted);
 
 }  // namespace overlapper

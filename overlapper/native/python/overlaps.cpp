@@ -226,13 +226,22 @@ of the facets that the body owns, and its moment. m² and m³; zeros unless over
 }
 
 /// A list with an array for each hull: the derivatives by its vertices, or the bounds of their errors.
-nb::list by_vertices(const Overlap& o, bool errors) {
+nb::list by_vertices(const Overlap& o, Wanted wanted) {
   nb::list list;
-  for (VertexGradient& each : computed_of(o.bodies(), [&] { return vertex_gradients(o, errors); })) {
+  for (VertexGradient& each : computed_of(o.bodies(), [&] { return vertex_gradients(o, wanted); })) {
     const size_t count = each.by_vertex.size();
-    if (count == 0) list.append(nb::none());
-    else if (errors) list.append(nb::cast(to_numpy<Vector>(std::move(each.error), {count}), nb::rv_policy::move));
-    else list.append(nb::cast(to_numpy(each.by_vertex), nb::rv_policy::move));
+    std::vector<double>& errors = wanted.centroid ? each.centroid_error : each.error;
+    if (count == 0) {
+      list.append(nb::none());
+    } else if (wanted.errors) {
+      list.append(nb::cast(to_numpy<Vector>(std::move(errors), {count}), nb::rv_policy::move));
+    } else if (wanted.centroid) {
+      const auto* first = reinterpret_cast<const double*>(each.centroid.data());
+      list.append(nb::cast(to_numpy<Matrices>(std::vector<double>(first, first + 9 * count), {count, 3, 3}),
+                           nb::rv_policy::move));
+    } else {
+      list.append(nb::cast(to_numpy(each.by_vertex), nb::rv_policy::move));
+    }
   }
   return list;
 }
@@ -284,8 +293,19 @@ for three or more bodies with a round body. Zeros unless overlapping. `errors.ce
       [](const Overlap& o) { return by_coordinates(o, centroid_gradient, &CentroidGradient::shape); },
       R"((m, 3, 3) d centroid / d (size) of each body, by the numbers of `shape_gradient`: half extents, radius and length, half
 axes, or the offset of a half-space, then zeros. Row j of a body has the derivatives of coordinate j. Without unit. NaN for
-hulls, for the length 0 of a capsule, and where `centroid_gradient` is NaN. Zeros unless
+hulls, for the length 0 of a capsule, and where `centroid_gradient` is NaN. Hulls have `centroid_vertex_gradients`. Zeros unless
 overlapping. `errors.centroid_shape_gradient` bounds the errors.)");
+}
+
+void define_centroid_vertex_gradients(nb::class_<Overlap>& cls) {
+  cls.def_prop_ro(
+      "centroid_vertex_gradients", [](const Overlap& o) { return by_vertices(o, {.errors = false, .centroid = true}); },
+      nb::sig("def centroid_vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]"),
+      R"(For each body, the (k, 3, 3) d centroid / d (position of a vertex), world axes, without unit, of the rows of
+`Hull.vertices`; None for other bodies than hulls and rounded hulls. Row j of a vertex has the derivatives of coordinate j. The vertices of
+a body have the sum centroid_gradient[i, :, :3]. Facets of more than three corners count as in `vertex_gradients`. NaN for
+rounded hulls, and for three or more bodies with a round body. Zeros unless overlapping. `errors.centroid_vertex_gradients`
+bounds the errors.)");
 }
 
 void define_shape_gradient(nb::class_<Overlap>& cls) {
@@ -302,7 +322,7 @@ derivatives, and the area counts for either body. For groups with a round body, 
 hulls, which have `vertex_gradients`, and for the length 0 of a capsule. NaN also for the few pairs with an ellipsoid that
 cannot be sliced. Zeros unless overlapping. `errors.shape_gradient` bounds the errors.)");
   cls.def_prop_ro(
-      "vertex_gradients", [](const Overlap& o) { return by_vertices(o, false); },
+      "vertex_gradients", [](const Overlap& o) { return by_vertices(o, {}); },
       nb::sig("def vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]"),
       R"(For each body, the (k, 3) d volume / d (position of a vertex), world axes, m², of the rows of `Hull.vertices`, or of
 `RoundedHull.core.vertices`; None for other bodies. The vertices of a body have the sum gradient[i, :3]. A facet of more than
@@ -383,10 +403,17 @@ Where facets of two bodies lie in one plane, derivatives are one-sided, and the 
   array_property(cls, "centroid_shape_gradient", of_centroid(&CentroidGradient::shape),
                  "(m, 3, 3) without unit, for each entry, as `centroid_gradient`. Computed on each access.");
   cls.def_prop_ro(
-      "vertex_gradients", [](const ErrorsOf& e) { return by_vertices(e.overlap, true); },
+      "vertex_gradients", [](const ErrorsOf& e) { return by_vertices(e.overlap, {.errors = true, .centroid = false}); },
       nb::sig("def vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]"),
       R"(For each body, (k,) m²: bounds of the lengths of the errors of the rows; None for other bodies than hulls and rounded
 hulls. Computed on each access.)");
+  cls.def_prop_ro(
+      "centroid_vertex_gradients",
+      [](const ErrorsOf& e) { return by_vertices(e.overlap, {.errors = true, .centroid = true}); },
+      nb::sig("def centroid_vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]"),
+      R"(For each body, (k,) without unit: bounds of the errors of all nine entries of a vertex; None for other bodies than
+hulls and rounded hulls. NaN where there is no derivative. Infinite for bodies that touch, and where the error of the volume is as large as the
+volume. Computed on each access.)");
   cls.def_prop_ro(
       "depth", [](const ErrorsOf& e) { return of_contact(e, &ContactErrors::depth); },
       nb::sig("def depth(self) -> float | None"),
@@ -544,6 +571,7 @@ quantities together; `errors.vertices` takes as long as `vertices`.)");
   define_shape_gradient(cls);
   define_hessian(cls);
   define_centroid_gradient(cls);
+  define_centroid_vertex_gradients(cls);
   define_boundary(cls);
   define_contact(cls);
   cls.def("__repr__", [](const Overlap& o) { return repr(o); });

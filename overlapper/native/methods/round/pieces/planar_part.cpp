@@ -72,6 +72,15 @@ struct Conic {
   bool strip() const { return !(height <= 2 * width); }
 };
 
+/// ∫ x xᵀ dA of a flat region.
+struct FlatProducts {
+  double xx = 0, xy = 0, yy = 0;
+
+  void add(double weight, Flat p) { xx += weight * p.x * p.x, xy += weight * p.x * p.y, yy += weight * p.y * p.y; }
+  /// p qᵀ + q pᵀ.
+  void add(Flat p, Flat q) { xx += 2 * p.x * q.x, xy += p.x * q.y + p.y * q.x, yy += 2 * p.y * q.y; }
+};
+
 /// A point of the plane.
 struct OnPlane {
   Flat circle, place;
@@ -176,10 +185,11 @@ class Sectioning {
 
   /// Sums over the region between chords and arcs, about the first corner.
   void integrate() {
-    area_ = rim_ = border_ = extent_ = 0, first_ = {};
+    area_ = rim_ = border_ = extent_ = 0, first_ = {}, second_ = {};
     if (chords_.empty()) {
       area_ = std::numbers::pi * conic_.area(), rim_ = 2 * std::numbers::pi * conic_.height;
       start_ = {};
+      second_.add(area_ / 4, {conic_.width, 0}), second_.add(area_ / 4, {0, conic_.height});
       return;
     }
     start_ = chords_[0].from.place;
@@ -204,6 +214,7 @@ class Sectioning {
     const Flat p = from - start_, q = to - start_;
     const double area = cross(p, q) / 2;
     area_ += area, first_ = first_ + (area / 3) * (p + q);
+    for (const Flat corner : {p, q, p + q}) second_.add(area / 12, corner);
     border_ += length(to - from), extent_ = std::max(extent_, length(to));
   }
 
@@ -222,9 +233,11 @@ class Sectioning {
     const quadric::Segment segment = quadric::segment(half_angle, sine, cosine);
     const double area = conic_.area() * segment.area;
     const Flat ahead{conic_.width * out.x, conic_.height * out.y};
-    area_ += area;
-    first_ =
-        first_ + (area * (0.5 * (from.place + to.place) - start_) + (conic_.area() * segment.first_across) * ahead);
+    const Flat middle = 0.5 * (from.place + to.place) - start_, first = (conic_.area() * segment.first_across) * ahead;
+    area_ += area, first_ = first_ + (area * middle + first);
+    second_.add(area, middle), second_.add(middle, first);
+    second_.add(conic_.area() * segment.second_across, ahead);
+    second_.add(conic_.area() * segment.second_along, (1 / chord) * (to.place - from.place));
     rim_ += 2 * half_angle * conic_.height;
   }
 
@@ -234,7 +247,11 @@ class Sectioning {
     found.error = kRounding * (border_ * extent_ + found.area);
     const Flat at = start_ + middle_;
     const Vec3 start = rounded(origin + (DoubleDouble{at.x} * u + DoubleDouble{at.y} * v));
-    found.first = found.area * start + (first_.x * rounded(u) + first_.y * rounded(v));
+    const Vec3 along = rounded(u), across = rounded(v), first = first_.x * along + first_.y * across;
+    found.first = found.area * start + first;
+    const auto [xx, xy, yy] = second_;
+    found.second = outer(start, found.area * start + first) + outer(first, start) +
+                   outer(along, xx * along + xy * across) + outer(across, xy * along + yy * across);
     return found;
   }
 
@@ -245,6 +262,7 @@ class Sectioning {
   bool nearly_whole_ = false;  ///< the polygon cuts nearly nothing from the circle
   Flat middle_;                ///< the origin of places, seen from the polygon's first corner
   Flat start_, first_;
+  FlatProducts second_;
   double area_ = 0, rim_ = 0, border_ = 0, extent_ = 0;
 };
 

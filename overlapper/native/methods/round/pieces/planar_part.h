@@ -13,12 +13,13 @@ using WidePolygon = std::vector<WideVector>;
 /// The part of a plane polygon inside a body.
 struct PlanarPart {
   double area = 0;
-  Vec3 first;        ///< ∫ x dA
-  double error = 0;  ///< of the area, by rounding
-  double rim = 0;    ///< growth of the area per distance that surfaces move, at most
+  Vec3 first;               ///< ∫ x dA
+  Mat3 second{{}, {}, {}};  ///< ∫ x xᵀ dA
+  double error = 0;         ///< of the area, by rounding
+  double rim = 0;           ///< growth of the area per distance that surfaces move, at most
 
   void add(const PlanarPart& other) {
-    area += other.area, first += other.first, error += other.error, rim += other.rim;
+    area += other.area, first += other.first, second = second + other.second, error += other.error, rim += other.rim;
   }
 };
 
