@@ -61,8 +61,10 @@ class HullSurface {
       for (Vec3 corner : polygon) off[f] = std::max(off[f], std::abs(signed_distance(planes_[f], corner)));
       nearest = std::min(nearest, off[f]);
     }
+    const auto near = [&](double distance) { return distance <= 2 * nearest + kRounding * reach_; };
+    const bool alone = std::ranges::count_if(off, near) == 1;
     for (size_t f = 0; f < planes_.size(); ++f)
-      if (off[f] <= 2 * nearest + kRounding * reach_) add_in_facet(static_cast<int>(f), polygon);
+      if (near(off[f])) add_in_facet(static_cast<int>(f), polygon, alone);
   }
 
   /// Adds a part of a triangle, with its area and ∫ x dA.
@@ -149,11 +151,13 @@ class HullSurface {
     Mat3 second{{}, {}, {}};  ///< ∫ x xᵀ dA, about the centroid
   };
 
-  void add_in_facet(int facet, const Polygon& polygon) {
+  /// A polygon that is alone in its facet ends within the facet. Only diagonals then cut it.
+  void add_in_facet(int facet, const Polygon& polygon, bool alone) {
     const auto ring = hull_.facet(facet);
     for (size_t i = 1; i + 1 < ring.size(); ++i) {
       cancellation_point();
-      add_in_triangle({ring[0], ring[i], ring[i + 1]}, planes_[facet].normal, polygon);
+      const std::array<bool, 3> cut{!alone || i > 1, !alone, !alone || i + 2 < ring.size()};
+      add_in_triangle({ring[0], ring[i], ring[i + 1]}, planes_[facet].normal, polygon, cut);
     }
   }
 
@@ -162,12 +166,15 @@ class HullSurface {
     return cross(vertices_[corners[1]] - start, vertices_[corners[2]] - start);
   }
 
-  void add_in_triangle(const std::array<int, 3>& corners, Vec3 normal, const Polygon& polygon) {
+  /// `cut` tells which sides cut the polygon.
+  void add_in_triangle(const std::array<int, 3>& corners, Vec3 normal, const Polygon& polygon,
+                       const std::array<bool, 3>& cut) {
     const auto at = [&](int k) { return vertices_[corners[k % 3]]; };
     const double twice = dot(twice_area(corners), normal);
     if (!(twice > 0)) return;
     part_ = polygon;
-    for (int k = 0; k < 3; ++k) cut_off(part_, cross(normal, at(k + 1) - at(k)), at(k), spare_);
+    for (int k = 0; k < 3; ++k)
+      if (cut[k]) cut_off(part_, cross(normal, at(k + 1) - at(k)), at(k), spare_);
     Sums sums;
     for (size_t i = 1; i + 1 < part_.size(); ++i) {
       const double piece = dot(cross(part_[i] - part_[0], part_[i + 1] - part_[0]), normal) / 2;
