@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "geometry/cancellation.h"
 #include "geometry/constants.h"
@@ -280,6 +281,22 @@ class RoundPair {
     return {found[0], found[1], found[2]};
   }
 
+  /// The factor of ∫ x n · axis dA in ∫ x s dA for the length of a capsule, unless the surface has parts of both ends.
+  /// The surface has no part of an end if the seam does not pass it, and the other body does not have its pole.
+  std::optional<double> share_of_length(int i, double half) const {
+    const Vec3 axis = bodies_[i].pose.rotation * Vec3{0, 0, 1};
+    const Placed other = bodies_[1 - i].seen_from(centroid_);
+    double share = 0;
+    int ends = 0;
+    for (const int side : {1, -1}) {
+      const Vec3 away = side * axis, pole = (half + std::get<Capsule>(bodies_[i].shape).radius) * away - lever(i);
+      const auto on_end = [&](const BorderNode& node) { return dot(away, node.place + lever(i)) >= half; };
+      const bool within = !(signed_distance(other.ray_exit({}, pole), pole) > 0);
+      if (within || std::ranges::any_of(border_[i], on_end)) share = side / 2.0, ++ends;
+    }
+    return ends < 2 ? std::optional(share) : std::nullopt;
+  }
+
   void add_sizes(int i) {
     const Shape& shape = bodies_[i].shape;
     Mat3& by_size = moments_[i].by_size;
@@ -293,10 +310,12 @@ class RoundPair {
     } else if (const Cylinder* cylinder = std::get_if<Cylinder>(&shape)) {
       by((along.row0 + along.row1) / cylinder->radius, along.row2 / cylinder->length);
     } else if (const Capsule* capsule = std::get_if<Capsule>(&shape)) {
-      // Radius and length together scale the capsule.
-      const Vec3 by_length = sums_[i].by_length, scaled_up = along.row0 + along.row1 + along.row2;
+      // Half of the length moves each end. Radius and length together scale the capsule.
+      const std::optional<double> share = share_of_length(i, capsule->length / 2);
+      const Vec3 axis = bodies_[i].pose.rotation * Vec3{0, 0, 1}, scaled_up = along.row0 + along.row1 + along.row2;
+      const Vec3 by_length = share ? *share * (moments_[i].first * axis) : sums_[i].by_length;
       const Vec3 by_radius = (scaled_up - capsule->length * by_length) / capsule->radius;
-      apart_[i] = norm(by_radius - sums_[i].by_radius);
+      one_end_[i] = share.has_value(), apart_[i] = norm(by_radius - sums_[i].by_radius);
       by(by_radius, capsule->length > 0 ? by_length : kNoNumbers);
     } else if (std::holds_alternative<RoundedHull>(shape)) {
       by(sums_[i].by_radius, {});
@@ -352,6 +371,11 @@ class RoundPair {
       return {(along.x + along.y + along.z) / sphere->radius, 0, 0};
     if (const Cylinder* cylinder = std::get_if<Cylinder>(&shape))
       return {(along.x + along.y) / cylinder->radius, along.z / cylinder->length, 0};
+    const Capsule* capsule = std::get_if<Capsule>(&shape);
+    if (capsule && one_end_[i]) {
+      const double scaled_up = along.x + along.y + along.z;
+      return {(scaled_up + capsule->length * sums.first) / capsule->radius, sums.first, 0};
+    }
     return for_numbers(shape, sums.first + (smooth(shape) ? of_sums : 0));
   }
 
@@ -361,6 +385,7 @@ class RoundPair {
   std::array<std::vector<BorderNode>, 2> border_, rims_;
   std::array<SurfaceMoments, 2> moments_;
   std::array<SurfaceSums, 2> sums_;
+  std::array<bool, 2> one_end_{};  ///< a capsule's surface has a part of one end at most
   std::array<double, 2> apart_{};  ///< m³, of two ways to ∫ x dA over a capsule
   int known_ = -1;                 ///< the body whose sums count
   int flat_ = -1;                  ///< the body without round parts

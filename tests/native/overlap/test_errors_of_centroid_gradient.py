@@ -218,6 +218,24 @@ def test_errors_hold_the_difference_of_a_pair_a_thousand_kilometres_away(kinds, 
             assert np.isfinite(room[known]).all()
 
 
+@pytest.mark.parametrize("depth", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_a_capsule_touched_on_its_side_has_the_derivatives_of_a_cylinder(depth):
+    rng = np.random.default_rng(9)
+    for _ in range(10):
+        turn, across = quaternion(rng), rng.normal(size=2)
+        across *= (0.4 + 0.3 - depth) / np.linalg.norm(across)
+        ball = Placed(Sphere(0.3), Rotation.from_quat(turn).apply([*across, rng.uniform(-0.2, 0.2)]))
+        capsule, cylinder = (overlap(Placed(shape(0.4, 1.0), (0, 0, 0), turn), ball) for shape in (Capsule, Cylinder))
+        if np.isnan(capsule.centroid_gradient).any() or np.isnan(cylinder.centroid_gradient).any():
+            continue
+        off = np.abs(capsule.centroid_shape_gradient - cylinder.centroid_shape_gradient)
+        room = capsule.errors.centroid_shape_gradient + cylinder.errors.centroid_shape_gradient
+        assert (off <= room).all()
+        by_length = capsule.centroid_shape_gradient[0, :, 1]
+        assert (np.abs(by_length) <= capsule.errors.centroid_shape_gradient[0, :, 1]).all()
+        assert depth < 1e-6 or not by_length.any()
+
+
 def test_errors_are_nan_where_there_is_no_derivative():
     cylinder = Cylinder(0.5, 2.0)
     for bodies in (
