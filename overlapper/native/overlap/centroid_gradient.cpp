@@ -6,7 +6,6 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/constants.h"
-#include "methods/round/seam/seam.h"
 #include "overlap/facet_sections.h"
 #include "overlap/revolved_surface.h"
 #include "overlap/rounded_surface.h"
@@ -181,19 +180,9 @@ class RoundPair {
   std::vector<CentroidGradient> found(std::vector<CentroidGradient>* errors = nullptr) {
     if (errors) *errors = {unknown(), unknown()};
     if (!std::ranges::all_of(bodies_, has_sums)) return {unknown(), unknown()};
-    std::array<std::vector<seam::SeamPoint>, 2> rims;
-    const auto points = seam::seam_of(bodies_[0], bodies_[1], centroid_, &rims);
-    if (!points) return {unknown(), unknown()};
-    for (const seam::SeamPoint& point : *points) {
-      const auto& [n, m] = point.outward;
-      const Vec3 step = point.weight * cross(n, m);
-      border_[0].push_back({point.place, step, unit(n)}), border_[1].push_back({point.place, -step, unit(m)});
-    }
-    for (const int i : {0, 1})
-      for (const seam::SeamPoint& point : rims[i]) {
-        const auto& [n, m] = point.outward;
-        rims_[i].push_back({point.place, point.weight * cross(n, m), unit(n)});
-      }
+    std::optional<Borders> borders = borders_of(overlap_);
+    if (!borders) return {unknown(), unknown()};
+    border_ = std::move(borders->seam), rims_ = std::move(borders->rims);
     add_seam();
     for (const int i : {0, 1}) look_at(i);
     complete(known_, sums_[known_]);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "shapes/shape.h"
 
@@ -21,6 +22,9 @@ struct SurfaceSums {
   Vec3 by_radius;       ///< ∫ x dA; not for an ellipsoid
   Vec3 by_length;       ///< ∫ x |n_z| / 2 dA; not for an ellipsoid
   double area = 0;      ///< m²; not for an ellipsoid
+  /// For each vertex of a rounded hull: ∫ x λ nᵀ dA over the balls and cylinders, with the share λ by which points move
+  /// along with the vertex.
+  std::vector<Mat3> by_vertex;
 };
 
 /// The sums for a ball, an ellipsoid, a capsule or a cylinder. `inside` is a point inside both bodies.

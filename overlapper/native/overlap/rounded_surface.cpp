@@ -6,6 +6,7 @@
 #include "geometry/cancellation.h"
 #include "geometry/constants.h"
 #include "methods/round/quadric/gauss.h"
+#include "methods/round/seam/seam.h"
 #include "overlap/facet_sections.h"
 #include "overlap/shape_gradient.h"
 
@@ -18,6 +19,7 @@ class RoundedSurface {
     const Placed relative = body.seen_from(inside);
     for (Vec3 v : hull_.vertices) vertices_.push_back(relative.pose * (hull_.origin + v));
     at_vertex_.resize(vertices_.size());
+    sums_.by_vertex.resize(vertices_.size(), Mat3{{}, {}, {}});
   }
 
   void add_face(const FacetSection& face) {
@@ -64,7 +66,7 @@ class RoundedSurface {
   }
 
   SurfaceSums sums() {
-    for (size_t v = 0; v < vertices_.size(); ++v) add_vertex(vertices_[v], at_vertex_[v]);
+    for (size_t v = 0; v < vertices_.size(); ++v) add_vertex(v, at_vertex_[v]);
     return sums_;
   }
 
@@ -79,9 +81,22 @@ class RoundedSurface {
     const Vec3 axis = unit(vertices_[edge.to] - vertices_[edge.from]), x = node.place;
     const double far = dot(axis, x), area = -far * dot(axis, cross(node.normal, node.step));
     add_point(x - far / 2 * axis, node.normal, area);
+    // Shares are linear along the edge. Gauss's two nodes are exact.
+    const double length = norm(vertices_[edge.to] - vertices_[edge.from]), step = std::sqrt(1.0 / 12);
+    for (const double part : {0.5 - step, 0.5 + step}) {
+      const Vec3 place = x + (part - 1) * far * axis;
+      const double share = dot(axis, place - vertices_[edge.from]) / length;
+      add_to_vertex(edge.to, share * area / 2, place, node.normal);
+      add_to_vertex(edge.from, (1 - share) * area / 2, place, node.normal);
+    }
   }
 
-  void add_vertex(Vec3 vertex, std::span<const BorderNode> border) {
+  void add_to_vertex(size_t v, double area, Vec3 x, Vec3 normal) {
+    sums_.by_vertex[v] = sums_.by_vertex[v] + outer(area * x, normal);
+  }
+
+  void add_vertex(size_t v, std::span<const BorderNode> border) {
+    const Vec3 vertex = vertices_[v];
     Vec3 sum;
     for (const BorderNode& node : border) sum += node.normal;
     const Vec3 pole = unit(sum);
@@ -95,8 +110,9 @@ class RoundedSurface {
       for (int i = 0; i < 16; ++i) {
         const double angle = half * (1 + (i % 2 == 0 ? -1 : 1) * quadric::kGaussNode[i / 2]);
         const Vec3 normal = std::cos(angle) * pole + std::sin(angle) / sine * across;
-        add_point(vertex + radius_ * normal, normal,
-                  turn * half * quadric::kGaussWeight[i / 2] * radius_ * radius_ * std::sin(angle));
+        const Vec3 x = vertex + radius_ * normal;
+        const double area = turn * half * quadric::kGaussWeight[i / 2] * radius_ * radius_ * std::sin(angle);
+        add_point(x, normal, area), add_to_vertex(v, area, x, normal);
       }
     }
   }
@@ -115,11 +131,33 @@ class RoundedSurface {
 
 }  // namespace
 
+std::optional<Borders> borders_of(const Overlap& overlap) {
+  Borders found;
+  std::array<std::vector<seam::SeamPoint>, 2> rims;
+  const auto points = seam::seam_of(overlap.bodies()[0], overlap.bodies()[1], overlap.centroid(), &rims);
+  if (!points) return std::nullopt;
+  for (const seam::SeamPoint& point : *points) {
+    const auto& [n, m] = point.outward;
+    const Vec3 step = point.weight * cross(n, m);
+    found.seam[0].push_back({point.place, step, unit(n)}), found.seam[1].push_back({point.place, -step, unit(m)});
+  }
+  for (const int i : {0, 1})
+    for (const seam::SeamPoint& point : rims[i]) {
+      const auto& [n, m] = point.outward;
+      found.rims[i].push_back({point.place, point.weight * cross(n, m), unit(n)});
+    }
+  return found;
+}
+
 SurfaceSums rounded_surface(const Overlap& overlap, int body, Vec3 inside, std::span<const BorderNode> border,
                             std::span<const BorderNode> rims) {
   const Placed& rounded = overlap.bodies()[body];
   constexpr Vec3 kUnknown{kNoDerivative, kNoDerivative, kNoDerivative};
-  if (polytope_of(rounded.shape)->edges.empty()) return {kNoDerivative, kUnknown, kUnknown, {}, kNoDerivative};
+  if (polytope_of(rounded.shape)->edges.empty()) {
+    const Mat3 of_vertex{kUnknown, kUnknown, kUnknown};
+    const size_t vertices = polytope_of(rounded.shape)->vertices.size();
+    return {kNoDerivative, kUnknown, kUnknown, {}, kNoDerivative, std::vector<Mat3>(vertices, of_vertex)};
+  }
   RoundedSurface surface(rounded, inside);
   for (const FacetSection& face : facet_sections(overlap, body, inside)) surface.add_face(face);
   for (const BorderNode& node : border) surface.add_seam(node);

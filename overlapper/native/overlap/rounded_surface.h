@@ -1,11 +1,21 @@
 #pragma once
 
+#include <array>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "overlap/overlap.h"
 #include "overlap/revolved_surface.h"
 
 namespace overlapper {
+
+/// The borders of the parts of both bodies of a pair that overlaps.
+struct Borders {
+  std::array<std::vector<BorderNode>, 2> seam, rims;
+};
+/// Places are about the centroid. No value if the seam has none.
+std::optional<Borders> borders_of(const Overlap& overlap);
 
 /// The sums for a rounded hull of a pair that overlaps. NaN if merging facets has left its core without edges. `rims`
 /// are the arcs in which its cylinders end, within the other body. Steps go around the cylinders' parts.

@@ -11,6 +11,7 @@
 #include "methods/round/round.h"
 #include "overlap/centroid_gradient.h"
 #include "overlap/facet_sections.h"
+#include "overlap/rounded_surface.h"
 #include "overlap/shape_gradient.h"
 
 namespace overlapper {
@@ -94,6 +95,11 @@ class HullSurface {
     }
   }
 
+  /// Adds sums over balls and cylinders, for each vertex.
+  void add(std::span<const Mat3> by_vertex) {
+    for (size_t v = 0; v < by_vertex.size(); ++v) of_centroid_[v] = of_centroid_[v] + by_vertex[v];
+  }
+
   double reach() const { return reach_; }
 
   /// Adds the difference of the sum from the area vector of the body's part to the errors.
@@ -109,10 +115,11 @@ class HullSurface {
   /// of the body, `whole`, are those of all vertices together. The difference is added to the errors.
   struct About {
     double volume, volume_error, owned, misplaced, radius, displaced;
+    double lost = 0;  ///< m³, of ∫ x λ nᵀ dA
   };
   void add_of_centroid(const About& about, bool with_errors, Vec3 force, const CentroidGradient& whole,
                        VertexGradient& result) const {
-    double lost = missing(force) * about.radius;
+    double lost = about.lost + missing(force) * about.radius;
     for (int j = 0; j < 3; ++j) {
       Vec3 sum;
       for (const Mat3& each : of_centroid_) sum += std::array{each.row0, each.row1, each.row2}[j];
@@ -255,15 +262,28 @@ std::optional<VertexGradient> in_pair(const Overlap& overlap, int body, Wanted w
   }
   const double misplaced = 16 * DBL_EPSILON * surface.reach();
   VertexGradient result = surface.found(force_of(overlap, body), owned, misplaced, wanted.errors);
-  if (smooth(overlap.bodies()[body].shape)) {
-    add_unknown(result.by_vertex.size(), wanted, result);
-  } else if (wanted.centroid) {
-    const double radius = wanted.errors ? std::sqrt(most_distance2(overlap.inertia(), overlap.volume())) : 0;
-    const double displaced = wanted.errors ? overlap.errors().centroid : 0;
-    surface.add_of_centroid({overlap.volume(), overlap.volume_error(), owned, misplaced, radius, displaced},
-                            wanted.errors, force_of(overlap, body),
-                            wanted.errors ? centroid_gradient(overlap)[body] : CentroidGradient(), result);
+  if (!wanted.centroid) return result;
+  const bool rounded = smooth(overlap.bodies()[body].shape);
+  if (rounded) {
+    const std::optional<Borders> borders = borders_of(overlap);
+    if (!borders) {
+      add_unknown(result.by_vertex.size(), wanted, result);
+      return result;
+    }
+    surface.add(rounded_surface(overlap, body, reference, borders->seam[body], borders->rims[body]).by_vertex);
   }
+  HullSurface::About about{overlap.volume(), overlap.volume_error(), owned, misplaced, 0, 0, 0};
+  if (wanted.errors) {
+    about.radius = std::sqrt(most_distance2(overlap.inertia(), overlap.volume()));
+    about.displaced = overlap.errors().centroid;
+    // Sums along the seam have the errors of those for poses.
+    if (rounded) {
+      const CentroidGradient errors = centroid_gradient_errors(overlap)[body];
+      for (const auto& row : errors.pose) about.lost += about.volume * row[0];
+    }
+  }
+  surface.add_of_centroid(about, wanted.errors, force_of(overlap, body),
+                          wanted.errors ? centroid_gradient(overlap)[body] : CentroidGradient(), result);
   return result;
 }
 
@@ -311,7 +331,7 @@ std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, Wanted want
     found[i] = surface.found(force_of(overlap, static_cast<int>(i)), owned, misplaced, with_errors);
     if (!flat) add_unknown(count, wanted, found[i]);
     if (!flat || !wanted.centroid) continue;
-    HullSurface::About about{determinant(region.frame.axes) * in_frame.volume, 0, owned, misplaced, 0, 0};
+    HullSurface::About about{determinant(region.frame.axes) * in_frame.volume, 0, owned, misplaced, 0, 0, 0};
     if (with_errors) {
       const StatedWithErrors measured = measured_with_errors(region, bodies);
       const bool known = measured.errors.volume < about.volume;

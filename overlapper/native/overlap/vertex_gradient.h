@@ -38,9 +38,10 @@ struct Wanted {
 /// fold a facet are not in the errors.
 ///
 /// Let λ be the coordinate of a vertex, and x the place about the centroid C. The volume V and C then change by V dC =
-/// ∫ x λ n · dv dA. On a facet, the integrand has the second degree. Rounded hulls have no such sums, and groups
-/// with a round body have none: NaN. The errors are those of the volume's derivative times the distance of the farthest
-/// point, plus what an error of the centroid moves.
+/// ∫ x λ n · dv dA. On a facet, the integrand has the second degree. Balls and cylinders have the sums of
+/// rounded_surface(). Groups with a round body have none: NaN. The errors are those of the volume's derivative times
+/// the distance of the farthest point, plus what an error of the centroid moves. The sum of all vertices is compared
+/// with centroid_gradient().
 std::vector<VertexGradient> vertex_gradients(const Overlap& overlap, Wanted wanted);
 
 }  // namespace overlapper

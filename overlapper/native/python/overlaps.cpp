@@ -302,10 +302,10 @@ void define_centroid_vertex_gradients(nb::class_<Overlap>& cls) {
       "centroid_vertex_gradients", [](const Overlap& o) { return by_vertices(o, {.errors = false, .centroid = true}); },
       nb::sig("def centroid_vertex_gradients(self) -> list[numpy.typing.NDArray[numpy.float64] | None]"),
       R"(For each body, the (k, 3, 3) d centroid / d (position of a vertex), world axes, without unit, of the rows of
-`Hull.vertices`; None for other bodies than hulls and rounded hulls. Row j of a vertex has the derivatives of coordinate j. The vertices of
-a body have the sum centroid_gradient[i, :, :3]. Facets of more than three corners count as in `vertex_gradients`. NaN for
-rounded hulls, and for three or more bodies with a round body. Zeros unless overlapping. `errors.centroid_vertex_gradients`
-bounds the errors.)");
+`Hull.vertices`, or of `RoundedHull.core.vertices`; None for other bodies. Row j of a vertex has the derivatives of coordinate j.
+The vertices of a body have the sum centroid_gradient[i, :, :3]. Facets of more than three corners count as in
+`vertex_gradients`. NaN for three or more bodies with a round body, and for rounded hulls where `centroid_gradient` is NaN. Zeros
+unless overlapping. `errors.centroid_vertex_gradients` bounds the errors.)");
 }
 
 void define_shape_gradient(nb::class_<Overlap>& cls) {

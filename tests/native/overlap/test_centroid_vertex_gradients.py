@@ -184,12 +184,58 @@ def test_a_box_as_a_hull_has_the_derivatives_of_the_box():
         assert_allclose((own * signs[:, None]).sum(0), by_size, rtol=0, atol=1e-11)
 
 
+BESIDE_ROUNDED = {**ROUND, "box": Box((0.5, 0.4, 0.3)), "hull": Hull(HULLS["cube"] * 0.8)}
+
+
+@pytest.mark.parametrize("kind", [*BESIDE_ROUNDED, "half-space"])
+def test_core_of_a_rounded_hull_against_differences_of_centroids(kind):
+    # The core has triangles, so that a vertex that moves folds no facet.
+    rng = np.random.default_rng(9)
+    rounded = RoundedHull(random_polytope(9, rng=7).vertices * 0.4, 0.2)
+    vertices = rounded.core.vertices
+    for _ in range(2):
+        ahead = rng.normal(size=3)
+        ahead *= rng.uniform(0.1, 0.6) / np.linalg.norm(ahead)
+        body = HalfSpace(ahead, 0.1) if kind == "half-space" else Placed(BESIDE_ROUNDED[kind], ahead, quaternion(rng))
+        found = overlap(rounded, body)
+        expected = differences(lambda moved, body=body: overlap(RoundedHull(moved, 0.2), body).centroid, vertices, 1e-5)
+        assert_allclose(found.centroid_vertex_gradients[0], expected, rtol=0, atol=5e-8)
+        assert found.errors.centroid_vertex_gradients[0].max() <= 1e-7
+
+
+@pytest.mark.parametrize("core", HULLS)
+@pytest.mark.parametrize("kind", BESIDE_ROUNDED)
+def test_vertices_of_a_core_add_up_to_the_derivatives_by_poses(kind, core):
+    # Lengths scale together: the centroid has the degree 1 in the core's vertices, the radius, and the other body.
+    rng = np.random.default_rng(10)
+    rounded = RoundedHull(HULLS[core] * 0.7, 0.15)
+    vertices = rounded.core.vertices
+    for depth in (0.2, 1e-2, 1e-4, 1e-6):
+        ahead, turn = rng.normal(size=3), quaternion(rng)
+        ahead /= np.linalg.norm(ahead)
+        low, high = 0.0, 5.0
+        for _ in range(50):
+            middle = (low + high) / 2
+            deep = penetration_depth(rounded, Placed(BESIDE_ROUNDED[kind], middle * ahead, turn)) > depth
+            low, high = (middle, high) if deep else (low, middle)
+        found = overlap(rounded, Placed(BESIDE_ROUNDED[kind], low * ahead, turn))
+        if np.isnan(found.centroid_gradient).any():
+            continue
+        by_vertex, stated = found.centroid_vertex_gradients[0], found.errors.centroid_vertex_gradients[0]
+        errors = found.errors.centroid_gradient[0]
+        turning = np.cross(vertices[:, None], by_vertex).sum(0)
+        assert (np.abs(by_vertex.sum(0) - found.centroid_gradient[0, :, :3]) <= stated.sum() + errors[:, :3]).all()
+        assert (np.abs(turning - found.centroid_gradient[0, :, 3:]) <= stated.sum() + errors[:, 3:]).all()
+        if depth > 1e-3:
+            assert stated.max() <= 1e-5 * np.abs(found.centroid_gradient).max()
+
+
 def test_where_there_are_none():
     hull, box = Hull(HULLS["cube"]), Box((0.5, 0.5, 0.5))
     assert overlap(box, Sphere(1)).centroid_vertex_gradients == [None, None]
     assert overlap(box, Sphere(1)).errors.centroid_vertex_gradients == [None, None]
     rounded = RoundedHull(HULLS["cube"], 0.1)
-    for bodies in ((rounded, Sphere(0.7)), (hull, Sphere(0.5), Placed(box, (0.1, 0, 0)))):
+    for bodies in ((rounded, Sphere(0.5), box), (hull, Sphere(0.5), Placed(box, (0.1, 0, 0))), (rounded, rounded)):
         found = overlap(*bodies)
         assert np.isnan(found.centroid_vertex_gradients[0]).all() and found.centroid_vertex_gradients[0].ndim == 3
         assert np.isnan(found.errors.centroid_vertex_gradients[0]).all()
