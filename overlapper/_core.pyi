@@ -1154,7 +1154,7 @@ class Overlaps:
     @property
     def gradient_error(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (p, 2, 6) error bounds of `gradient`, m² and m³, as Overlap.errors.gradient. The first use takes some tens of
+        (p, 2, 6) error bounds of `gradient`, m² and m³, as Overlap.errors.gradient. The first use takes some hundreds of
         microseconds for each pair of polyhedra, and longer for round bodies.
         """
 

@@ -259,7 +259,7 @@ void define_patch_column(nb::class_<Overlaps>& cls, const char* name, std::vecto
 void define_errors_of_gradients(nb::class_<Overlaps>& cls) {
   define_column<BodyGradients>(
       cls, "gradient_error", lazy_column(&Overlaps::gradient_errors, &Gradients::pose),
-      R"((p, 2, 6) error bounds of `gradient`, m² and m³, as Overlap.errors.gradient. The first use takes some tens of
+      R"((p, 2, 6) error bounds of `gradient`, m² and m³, as Overlap.errors.gradient. The first use takes some hundreds of
 microseconds for each pair of polyhedra, and longer for round bodies.)");
   define_column<ShapeGradients>(cls, "shape_gradient_error", lazy_column(&Overlaps::gradient_errors, &Gradients::shape),
                                 "(p, 2, 3) error bounds of `shape_gradient`, m², as Overlap.errors.shape_gradient.");
