@@ -60,6 +60,9 @@ MENDED = {
     "many parts within the ellipsoid": ("ellipsoid, mesh with margin", 10184),
     "cuts through two capsules": ("capsule, capsule", 10428),
     "cuts through two rounded hulls": ("rounded hull, mesh with margin", 10142),
+    "an edge oblique to a cylinder and nearly along it": ("hull, cylinder", 50288),
+    "an edge nearer to a cylinder than its faces are steep": ("hull, cylinder", 61012),
+    "an edge between nearly parallel faces": ("hull, cylinder", 10130),
 }
 
 

@@ -12,7 +12,7 @@ constexpr double kOneDirection = 1e-24;
 constexpr double kParallel = 1e-11;
 /// The border of a plane with a tilt between kParallel and kRushing would move too fast from slice to slice.
 constexpr double kRushing = 1e-3;
-/// A ridge with a smaller component across the slices counts as parallel to the slices.
+/// A ridge with a smaller sine against the slices counts as parallel to the slices.
 constexpr double kSteep = 0.05;
 /// If the distance to the walls is shorter than the distance to the round by this factor, slices are strips along a
 /// wall. In axes along the wall, the width of the strips has all digits.
@@ -41,23 +41,43 @@ WayOut way_out(const Round& r) {
   return {{}, r.radius - length};
 }
 
-/// The ways to the nearest surface, and to the nearest surface that is not parallel to that one.
-std::array<WayOut, 2> nearest(std::span<const Round> rounds, std::span<const Wall> walls) {
-  std::array<WayOut, 2> ways{
-      {{{}, std::numeric_limits<double>::infinity()}, {{}, std::numeric_limits<double>::infinity()}}};
-  const auto each = [&](auto use) {
-    for (const Round& r : rounds) use(way_out(r));
+/// The way to the nearest surface, and the nearest ridge of that surface and another one, by their tangent planes.
+struct Nearest {
+  WayOut way{{}, std::numeric_limits<double>::infinity()};
+  WideVector ridge;  ///< of any length; zero if all surfaces are parallel
+  double ridge_distance = std::numeric_limits<double>::infinity();  ///< m
+
+  bool thin() const { return way.slack < kThin * ridge_distance; }
+};
+
+Nearest nearest(std::span<const Round> rounds, std::span<const Wall> walls) {
+  // The tangent plane of a round that is nearly parallel to another plane meets it far from the round.
+  constexpr double kAcross = 1e-2;
+  Nearest result;
+  WayOut wall_way = result.way;
+  const auto each_wall = [&](auto use) {
     for (const Wall& wall : walls)
       if (wall.owner != kCut) use(WayOut{wall.normal, wall.slack.head});
   };
-  each([&](const WayOut& way) {
-    if (way.slack < ways[0].slack) ways[0] = way;
+  const auto keep_nearer = [](const WayOut& way, WayOut& best) {
+    if (way.slack < best.slack) best = way;
+  };
+  each_wall([&](const WayOut& way) { keep_nearer(way, wall_way); });
+  result.way = wall_way;
+  for (const Round& r : rounds) keep_nearer(way_out(r), result.way);
+  const auto add_ridge = [&](const WayOut& a, const WayOut& b, double least) {
+    const Vec3 p = rounded(a.normal), q = rounded(b.normal);
+    const double square = norm2(cross(p, q));  // of the sine
+    if (!(square > least)) return;
+    const double distance = norm(b.slack * p - a.slack * q) / std::sqrt(square);
+    if (distance < result.ridge_distance) result.ridge = cross(a.normal, b.normal), result.ridge_distance = distance;
+  };
+  for (const Round& r : rounds) add_ridge(result.way, way_out(r), kAcross);
+  each_wall([&](const WayOut& way) {
+    add_ridge(result.way, way, kAcross);
+    add_ridge(wall_way, way, kOneDirection);
   });
-  const Vec3 normal = rounded(ways[0].normal);
-  each([&](const WayOut& way) {
-    if (way.slack < ways[1].slack && norm2(cross(normal, rounded(way.normal))) > 1e-2) ways[1] = way;
-  });
-  return ways;
+  return result;
 }
 
 /// A unit vector orthogonal to `axis`, and parallel to the nearest wall that is not orthogonal to the axis, if there is
@@ -73,6 +93,11 @@ WideVector along_an_edge(const WideVector& axis, std::span<const Wall> walls) {
   return unit(across(best, axis));
 }
 
+/// Whether a ridge, of any length, is not nearly parallel to the slices across a unit vector.
+bool steep(const WideVector& ridge, const WideVector& n) {
+  return std::abs(rounded(dot(ridge, n))) > kSteep * rounded(norm(ridge));
+}
+
 /// Axes with t along a direction.
 Axes sheared(const WideVector& l, const WideVector& m, const WideVector& n, const WideVector& along) {
   const DoubleDouble rise = dot(along, n), x = dot(along, l) / rise, y = dot(along, m) / rise;
@@ -86,10 +111,8 @@ Axes turned(const WideVector& l, const WideVector& m0, double tangent_of_angle, 
   const WideVector n0 = cross(l, m0);
   const DoubleDouble tangent{tangent_of_angle}, cosine = DoubleDouble{1} / sqrt(DoubleDouble{1} + tangent * tangent);
   const WideVector m = cosine * (m0 - tangent * n0), n = cosine * (n0 + tangent * m0);
-  const std::array<WayOut, 2> ways = nearest(rounds, walls);
-  const WideVector ridge = cross(ways[0].normal, ways[1].normal);
-  const bool thin = ways[0].slack < kThin * ways[1].slack;
-  return sheared(l, m, n, !thin && std::abs(rounded(dot(ridge, n))) > kSteep ? ridge : n0);
+  const Nearest near = nearest(rounds, walls);
+  return sheared(l, m, n, !near.thin() && steep(near.ridge, n) ? near.ridge : n0);
 }
 
 /// The same slices, with m across the strips that the slices form along a wall.
@@ -110,21 +133,20 @@ Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double t
     const DoubleDouble sine = norm(both);
     if (sine.head > kOneDirection) {
       const WideVector n = unit(both);
-      const std::array<WayOut, 2> ways = nearest(rounds, walls);
-      const WideVector out = ways[0].normal, flat = across(out, n);
+      const Nearest near = nearest(rounds, walls);
+      const WideVector out = near.way.normal, flat = across(out, n);
       const double width = rounded(norm(flat)), radius = std::min(one->radius, two->radius);
       if (!(width > 1e-3)) return {cross(unit(cross(one->axis, n)), n), unit(cross(one->axis, n)), n, n, {}, {}};
       const WideVector m = unit(flat), l = cross(m, n);
       WideVector along = n;
-      const WideVector ridge = cross(out, ways[1].normal);
       // If the shortest way out is nearly across the slices, the slices are as wide as the common set.
-      if (std::abs(rounded(dot(ridge, n))) > kSteep) along = ridge;
-      else if (width > 8 * std::sqrt(std::max(0.0, 2 * ways[0].slack / radius))) along = across(n, out);
+      if (steep(near.ridge, n)) along = near.ridge;
+      else if (width > 8 * std::sqrt(std::max(0.0, 2 * near.way.slack / radius))) along = across(n, out);
       return sheared(l, m, n, along);
     }
   }
   if (one) {
-    const WayOut nearest_way = nearest(rounds, walls)[0], of_side = way_out(*one);
+    const WayOut nearest_way = nearest(rounds, walls).way, of_side = way_out(*one);
     WideVector out = of_side.normal;
     const bool thin = nearest_way.slack < kThin * of_side.slack;
     if (thin && norm2(rounded(across(nearest_way.normal, one->axis))) > kSteep * kSteep) out = nearest_way.normal;
@@ -132,7 +154,7 @@ Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double t
     const Axes axes = turned(one->axis, unit(across(out, one->axis)), tangent_of_angle, rounds, walls);
     return thin ? along_strips(axes, nearest_way.normal) : axes;
   }
-  const WayOut nearest_way = nearest(rounds, walls)[0];
+  const WayOut nearest_way = nearest(rounds, walls).way;
   WideVector out = nearest_way.normal;
   if (!rounds.empty()) {
     const WayOut of_ball = way_out(rounds[0]);
