@@ -63,6 +63,7 @@ MENDED = {
     "an edge oblique to a cylinder and nearly along it": ("hull, cylinder", 50288),
     "an edge nearer to a cylinder than its faces are steep": ("hull, cylinder", 61012),
     "an edge between nearly parallel faces": ("hull, cylinder", 10130),
+    "an end of a cylinder that rushes across slices": ("cylinder, rounded hull", 52012),
 }
 
 

@@ -132,7 +132,7 @@ bool add_surely(const SlicedPiece& piece, const PieceSetting& setting, Sums& sum
 bool add_placed(const SlicedPiece& piece, const PieceSetting& setting, Sums& sums) {
   if (!piece.around) return add_slices(piece, setting, sums);
   const Vec3 middle = piece.around->middle();
-  if (const auto rushing = slicing::rushing(piece.rounds, piece.walls, middle); !rushing.empty())
+  if (const auto rushing = slicing::rushing(piece.rounds, piece.walls, middle, setting.closely); !rushing.empty())
     return add_slabs(rushing, piece, setting, sums);
   if (!piece.around->excludes({})) return add_slices(piece, setting, sums);
   return (norm(middle) <= piece.around->reach(middle) && add_surely(piece, setting, sums)) ||

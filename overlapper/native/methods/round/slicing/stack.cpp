@@ -12,6 +12,8 @@ constexpr double kOneDirection = 1e-24;
 constexpr double kParallel = 1e-11;
 /// The border of a plane with a tilt between kParallel and kRushing would move too fast from slice to slice.
 constexpr double kRushing = 1e-3;
+/// Planes with a smaller tilt may count as such, too. Their lines lose up to 1 / tilt times the digits of the places.
+constexpr double kRushingAtAll = 0.2;
 /// A ridge with a smaller sine against the slices counts as parallel to the slices.
 constexpr double kSteep = 0.05;
 /// If the distance to the walls is shorter than the distance to the round by this factor, slices are strips along a
@@ -261,14 +263,15 @@ void add_round(Stack& stack, const Round& r, const Axes& axes) {
 
 }  // namespace
 
-std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall> walls, Vec3 point) {
+std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall> walls, Vec3 point, bool all) {
   std::vector<Rushing> found;
   if (!two_cylinders(rounds)) return found;
   const Vec3 across = rounded(unit(cross(rounds[0].axis, rounds[1].axis)));
+  const double most = all ? kRushingAtAll : kRushing;
   for (const Wall& wall : walls) {
     const Vec3 normal = rounded(wall.normal);
     const double tilt = norm(cross(normal, across));
-    if (!(tilt > kParallel && tilt < kRushing)) continue;
+    if (!(tilt > kParallel && tilt < most)) continue;
     const Vec3 beside = point + (wall.slack.head - dot(normal, point)) * normal;
     found.push_back({dot(across, beside), beside});
   }

@@ -22,7 +22,7 @@ struct Rushing {
   double level;  ///< across the slices
   Vec3 beside;   ///< a point of the plane beside another point; about it, doubles resolve these slices
 };
-/// All such planes by level, each with its point beside `point`.
-std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall> walls, Vec3 point);
+/// These planes by level, each with its point beside `point`. With `all`, planes count that are less parallel.
+std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall> walls, Vec3 point, bool all);
 
 }  // namespace overlapper::slicing
