@@ -85,6 +85,25 @@ def test_a_rounded_hull_within_an_ellipsoid_has_its_own_volume(kinds, seed):
     assert abs(found.volume - own.volume) <= found.volume_error + own.volume_error <= 1e-11 * own.volume
 
 
+# Contacts whose halves once were off by more than they state, by what was too small.
+HALVES = {
+    "places of corners that were cut far outside": ("box, rounded hull", 70135),
+    "places of corners in a thin polytope": ("hull, cylinder", 70170),
+}
+
+
+@pytest.mark.parametrize("reason", HALVES)
+def test_halves_state_their_errors(reason):
+    contact = graded.made(*HALVES[reason])
+    found = overlap(contact.a, contact.b)
+    normal = graded.directions(np.random.default_rng(1), 1)[0]
+    for side in (1, -1):
+        half = overlap(contact.a, contact.b, HalfSpace(side * normal, side * float(normal @ found.centroid)))
+        lower, upper = graded.bounds(half)
+        volume, error = Fraction(half.volume), Fraction(half.volume_error)
+        assert lower - error <= volume <= upper + error and error <= 2e-12 * volume
+
+
 def test_all_classes_of_the_page_are_graded():
     assert len(graded.CLASSES) == 44
 

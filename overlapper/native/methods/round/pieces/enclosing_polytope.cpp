@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cfloat>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -117,6 +119,26 @@ void EnclosingPolytope::drop_faces() {
   faces.resize(next);
   for (Corner& corner : corners)
     for (int& face : corner.face) face = place[face];
+}
+
+double EnclosingPolytope::settle() {
+  const double rounding = 4 * DBL_EPSILON * extent();
+  double remaining = 0;
+  for (Corner& corner : corners) {
+    const Face &a = faces[corner.face[0]], &b = faces[corner.face[1]], &c = faces[corner.face[2]];
+    const auto beyond = [&](Vec3 at) {
+      return Vec3{a.slack - dot(a.normal, at), b.slack - dot(b.normal, at), c.slack - dot(c.normal, at)};
+    };
+    const Vec3 off = beyond(corner.at);
+    const double distance = max_component(abs(off));
+    if (distance <= rounding) continue;
+    const Vec3 bc = cross(b.normal, c.normal), ca = cross(c.normal, a.normal), ab = cross(a.normal, b.normal);
+    const Vec3 at = corner.at + (off.x * bc + off.y * ca + off.z * ab) / dot(a.normal, bc);
+    const double left = max_component(abs(beyond(at)));
+    if (left < distance) corner.at = at;
+    if (const double now = std::min(left, distance); now > rounding) remaining = std::max(remaining, now);
+  }
+  return remaining;
 }
 
 void EnclosingPolytope::number_faces(std::vector<std::array<int, 3>>& number, std::vector<int>& left) const {

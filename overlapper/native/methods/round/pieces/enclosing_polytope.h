@@ -37,6 +37,10 @@ struct EnclosingPolytope {
   bool cut(const Face& face);
   /// Removes the faces without a remaining part.
   void drop_faces();
+  /// Puts every corner where its three faces meet, to the rounding of its own place. A cut places a corner on an edge,
+  /// to the rounding of the ends of that edge, which may lie far outside. Returns the largest remaining distance of a
+  /// corner from a face, in m, or 0 if that is only rounding.
+  double settle();
 
   /// Calls use(face, ring) for each remaining face, with its corners counter-clockwise from outside.
   template <class Use>

@@ -18,10 +18,14 @@ constexpr double kSureOfMoments = 5e-11;
 
 using Face = EnclosingPolytope::Face;
 
-/// The error of a polytope's volume by the rounding of corners from cuts.
-double rounding_of(const EnclosingPolytope& polytope, double border) {
-  return 16 * DBL_EPSILON * polytope.extent() * border;
-}
+/// A polytope with settled corners.
+struct Settled {
+  const EnclosingPolytope& polytope;
+  double misplaced;  ///< m: distance of corners from their faces, beyond rounding
+
+  /// The error of the volume of a part by the places of corners.
+  double error(double border) const { return (16 * DBL_EPSILON * polytope.extent() + misplaced) * border; }
+};
 
 /// Negligible rounding, relative to the volume, for a piece with so many faces.
 double limit(size_t faces, const PieceSetting& setting) { return sliceable(faces) ? setting.sure : kSureOfMany; }
@@ -68,8 +72,8 @@ FaceArea add_tetrahedra(const EnclosingPolytope& polytope, const Face& face, std
   return of_face;
 }
 
-bool add_polytope(const EnclosingPolytope& polytope, const DistinctWalls& distinct, const PieceSetting& setting,
-                  Sums& sums) {
+bool add_polytope(const Settled& settled, const DistinctWalls& distinct, const PieceSetting& setting, Sums& sums) {
+  const EnclosingPolytope& polytope = settled.polytope;
   PolytopeSums of_piece{{}, sums.patch};
   Totals& piece = of_piece.piece;
   const Vec3 apex = polytope.corners[0].at;
@@ -88,7 +92,7 @@ bool add_polytope(const EnclosingPolytope& polytope, const DistinctWalls& distin
     if (owner != slicing::kCut) piece.unbalanced += force;
     if (owner == 0) piece.pull += force, piece.moment += cross(first, face.normal);
   });
-  piece.error = rounding_of(polytope, piece.border) + DBL_EPSILON * of_piece.cancelled;
+  piece.error = settled.error(piece.border) + DBL_EPSILON * of_piece.cancelled;
   if (!closed || !sure(piece, polytope.faces.size(), setting, sums.totals)) return false;
   sums.totals.add(piece);
   sums.patch = of_piece.patch;
@@ -133,12 +137,12 @@ bool add_surface(const RoundPart& part, Totals& piece) {
 }
 
 /// Adds part of a round. `piece` has its volume, moments and error in the part's own coordinates.
-bool add_round_part(const RoundPart& part, const EnclosingPolytope& polytope, const PieceSetting& setting,
-                    Totals& piece, Totals& totals) {
+bool add_round_part(const RoundPart& part, const Settled& settled, const PieceSetting& setting, Totals& piece,
+                    Totals& totals) {
   const bool nothing = std::ranges::none_of(part.sections, [](const quadric::Section& s) { return s.area != 0; });
   if (!(piece.volume > 0)) return piece.volume == 0 && nothing;
   if (!add_surface(part, piece)) return false;
-  piece.error += rounding_of(polytope, piece.border);
+  piece.error += settled.error(piece.border);
   const Moments about_centre = piece.along({part.turn.row0, part.turn.row1, part.turn.row2});
   const Vec3 mean = piece.first / piece.volume;
   static_cast<Moments&>(piece) = about_centre.seen_from(part.centre);
@@ -169,8 +173,9 @@ struct CylinderScratch {
   std::vector<int> owners;
 };
 
-bool add_cylinder(const Round& cylinder, const EnclosingPolytope& polytope, const DistinctWalls& distinct,
+bool add_cylinder(const Round& cylinder, const Settled& settled, const DistinctWalls& distinct,
                   const PieceSetting& setting, Sums& sums) {
+  const EnclosingPolytope& polytope = settled.polytope;
   const Scratch<CylinderScratch> scratch;
   quadric::Rings& rings = scratch->rings;
   std::vector<int>& owners = scratch->owners;
@@ -189,7 +194,7 @@ bool add_cylinder(const Round& cylinder, const EnclosingPolytope& polytope, cons
   static_cast<Moments&>(piece) = *found, piece.error = found->error;
   const RoundPart part{cylinder.owner, found->curved, found->whole_area, rings.planes(), owners, found->sections,
                        turn,           centre};
-  if (!add_round_part(part, polytope, setting, piece, sums.totals)) return false;
+  if (!add_round_part(part, settled, setting, piece, sums.totals)) return false;
   if (sums.patch) add_to_patch(part, setting.view, *sums.patch);
   return true;
 }
@@ -238,8 +243,9 @@ struct AboutBall {
 };
 
 /// True also if the common part is empty.
-bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const DistinctWalls& distinct,
-              const PieceSetting& setting, Sums& sums) {
+bool add_ball(const Round& ball, const Settled& settled, const DistinctWalls& distinct, const PieceSetting& setting,
+              Sums& sums) {
+  const EnclosingPolytope& polytope = settled.polytope;
   const Scratch<AboutBall> about;
   const Vec3 centre = rounded(ball.centre);
   const double nothing = 16 * DBL_EPSILON * (polytope.extent() + norm(centre));
@@ -256,18 +262,19 @@ bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const Distin
   if (!(piece.error <= limit(faces, setting) * ball.radius * (sums.totals.area + found->area))) return false;
   const RoundPart part{ball.owner,    {-found->flat, {}}, found->area, about->planes,
                        about->owners, found->sections,    {},          centre};
-  if (!add_round_part(part, polytope, setting, piece, sums.totals)) return false;
+  if (!add_round_part(part, settled, setting, piece, sums.totals)) return false;
   if (sums.patch) add_to_patch(part, setting.view, *sums.patch);
   return true;
 }
 
 }  // namespace
 
-bool add_in_polytope(const Round* round, const EnclosingPolytope& polytope, const DistinctWalls& distinct,
+bool add_in_polytope(const Round* round, EnclosingPolytope& polytope, const DistinctWalls& distinct,
                      const PieceSetting& setting, Sums& sums) {
-  if (!round) return add_polytope(polytope, distinct, setting, sums);
-  if (round->ball) return add_ball(*round, polytope, distinct, setting, sums);
-  return add_cylinder(*round, polytope, distinct, setting, sums);
+  const Settled settled{polytope, polytope.settle()};
+  if (!round) return add_polytope(settled, distinct, setting, sums);
+  if (round->ball) return add_ball(*round, settled, distinct, setting, sums);
+  return add_cylinder(*round, settled, distinct, setting, sums);
 }
 
 }  // namespace overlapper::pieces

@@ -99,7 +99,7 @@ bool Mitred::add_both(const Slot& one, const Slot& other, const PieceSetting& se
          add_rounds(rounds, loose_part_of_one_, setting, more_);
 }
 
-bool Mitred::add_rounds(std::span<const Round> rounds, const EnclosingPolytope& polytope, const PieceSetting& setting,
+bool Mitred::add_rounds(std::span<const Round> rounds, EnclosingPolytope& polytope, const PieceSetting& setting,
                         Sums& sums) {
   const Vec3 middle = polytope.middle();
   const double margin = 1e-13 * polytope.extent();

@@ -37,8 +37,7 @@ class Mitred {
                  const PieceSetting& setting);
   bool add_both(const Slot& one, const Slot& other, const PieceSetting& setting);
   /// Adds the common part of a polytope and of rounds. False if neither doubles nor slices give it.
-  bool add_rounds(std::span<const Round> rounds, const EnclosingPolytope& polytope, const PieceSetting& setting,
-                  Sums& sums);
+  bool add_rounds(std::span<const Round> rounds, EnclosingPolytope& polytope, const PieceSetting& setting, Sums& sums);
 
   EnclosingPolytope common_, loose_a_, loose_b_;
   EnclosingPolytope part_, loose_part_of_one_, loose_part_of_other_;

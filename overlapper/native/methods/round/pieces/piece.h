@@ -17,8 +17,9 @@ std::optional<Wall> radical_plane(const Round& a, const Round& b);
 void add_cap(const Round& ball, const Wall* wall, const PieceSetting& setting, Sums& sums);
 
 /// Adds, in closed form, the common part of a polytope and at most one round. Faces of the polytope have the numbers of
-/// their walls. False if doubles are not accurate to the relevant fraction of the whole; nothing is then added.
-bool add_in_polytope(const Round* round, const EnclosingPolytope& polytope, const DistinctWalls& distinct,
+/// their walls, and its corners are settled. False if doubles are not accurate to the relevant fraction of the whole;
+/// nothing is then added.
+bool add_in_polytope(const Round* round, EnclosingPolytope& polytope, const DistinctWalls& distinct,
                      const PieceSetting& setting, Sums& sums);
 
 /// The part of some rounds inside the walls: at most two cylinders, and then at most one ball. Coordinates are relative
