@@ -64,6 +64,8 @@ MENDED = {
     "an edge nearer to a cylinder than its faces are steep": ("hull, cylinder", 61012),
     "an edge between nearly parallel faces": ("hull, cylinder", 10130),
     "an end of a cylinder that rushes across slices": ("cylinder, rounded hull", 52012),
+    "parallel cylinders as thin as rounding": ("cylinder, cylinder", 70057),
+    "parallel cylinders with round ends as thin as rounding": ("capsule, cylinder", 70325),
 }
 
 

@@ -148,7 +148,7 @@ void add_sum(const Stack& stack, const slicing::Sum& sum, Vec3 offset, const qua
   totals.volume += s.correction;
   totals.error += error_of(sum);
   totals.area += s.area, totals.first_area += s.first_area, totals.area_error += sum.area_error;
-  totals.border += s.border;
+  totals.border += s.border, totals.closed_border += s.border - s.cut_border;
   const Vec3 pull = turned(s.pull[0]);
   totals.pull += pull;
   // The moment of a stretched ball's own surface is opposite to that of all other surface, as both close.
@@ -156,6 +156,7 @@ void add_sum(const Stack& stack, const slicing::Sum& sum, Vec3 offset, const qua
   const Vec3 moment = of_stretched ? -(s.moment[1] + s.moment[2]) : s.moment[0];
   totals.moment += turned(moment) + (stretch ? stretch->moment(offset, pull) : cross(offset, pull));
   totals.unbalanced += turned(s.pull[0] + s.pull[1]);
+  totals.left += turned(s.pull[0] + s.pull[1] + s.pull[2]);
   if (sums.patch) sums.patch->add(s.seen[0], s.seen[1], s.seen[2], s.seen[3], s.seen[4], s.seen[5]);
 }
 

@@ -25,11 +25,14 @@ struct Totals : Moments {
   Moments sizes;          ///< sizes of the terms of an ellipsoid's moments
   Vec3 pull, moment;
   Vec3 unbalanced;  ///< the sum of both bodies' area vectors: zero if no piece is missing
+  // What sliced pieces without their cuts add to `border`, and their whole surfaces, which are closed, to `unbalanced`.
+  double closed_border = 0;
+  Vec3 left;
 
   void add(const Totals& piece) {
     Moments::operator+=(piece);
     error += piece.error, area += piece.area, border += piece.border, open += piece.open;
-    first_area += piece.first_area;
+    first_area += piece.first_area, closed_border += piece.closed_border, left += piece.left;
     pull += piece.pull, moment += piece.moment, unbalanced += piece.unbalanced;
   }
 
@@ -41,9 +44,10 @@ struct Totals : Moments {
     sum(squares, more.squares, less.squares), sum(products, more.products, less.products);
     sum(area, more.area, less.area), sum(first_area, more.first_area, less.first_area);
     sum(pull, more.pull, less.pull), sum(moment, more.moment, less.moment);
-    sum(unbalanced, more.unbalanced, less.unbalanced);
+    sum(unbalanced, more.unbalanced, less.unbalanced), sum(left, more.left, less.left);
     errors(error, more.error, less.error), errors(area_error, more.area_error, less.area_error);
-    errors(border, more.border, less.border), errors(open, more.open, less.open);
+    errors(border, more.border, less.border), errors(closed_border, more.closed_border, less.closed_border);
+    errors(open, more.open, less.open);
   }
 
   /// Adds to the area if the surface belongs to a body, and not to a cut.
@@ -54,15 +58,20 @@ struct Totals : Moments {
 };
 
 /// m³: bound of the missing volume if the area vectors of the whole surface do not sum to zero: their sum times the
-/// extent along it. The whole volume for a set so thin that a sum over the rest of it is rounding.
+/// extent along it. If the set is so thin that the rounding of that sum hides it, only cuts are summed, and pieces in
+/// closed form: `open` bounds what sliced pieces leave. The whole volume if rounding hides this sum, too.
 inline double missing(const Totals& totals) {
-  const Vec3 u = totals.unbalanced, s = totals.squares, p = totals.products;
-  const double square =
-      u.x * u.x * s.x + u.y * u.y * s.y + u.z * u.z * s.z + 2 * (u.y * u.z * p.x + u.z * u.x * p.y + u.x * u.y * p.z);
-  const double rounding = slicing::kSummation * totals.border * std::sqrt((s.x + s.y + s.z) / totals.volume);
-  constexpr double kThin = 1e-3;
-  if (!(rounding <= kThin * totals.volume)) return totals.volume;
-  return std::max(0.0, std::sqrt(std::max(0.0, square / totals.volume)) - rounding);
+  const Vec3 s = totals.squares, p = totals.products;
+  const auto volume_of = [&](Vec3 u, double border) -> std::optional<double> {
+    const double square =
+        u.x * u.x * s.x + u.y * u.y * s.y + u.z * u.z * s.z + 2 * (u.y * u.z * p.x + u.z * u.x * p.y + u.x * u.y * p.z);
+    const double rounding = slicing::kSummation * border * std::sqrt((s.x + s.y + s.z) / totals.volume);
+    constexpr double kThin = 1e-3;
+    if (!(rounding <= kThin * totals.volume)) return std::nullopt;
+    return std::max(0.0, std::sqrt(std::max(0.0, square / totals.volume)) - rounding);
+  };
+  if (const auto found = volume_of(totals.unbalanced, totals.border)) return *found;
+  return volume_of(totals.unbalanced - totals.left, totals.border - totals.closed_border).value_or(totals.volume);
 }
 
 /// m³: bound of the missing volume of all pieces.

@@ -221,7 +221,9 @@ class Bundle {
     sum_.moment[line.owner] += stack_.moment(place, normal);
     sum_.across += mt * normal.z;
     sum_.terms += sum(size) * (rate + std::abs(s.x) * nx + std::abs(s.y) * ny);
-    sum_.border += all * std::sqrt(norm2(normal));
+    const double border = all * std::sqrt(norm2(normal));
+    sum_.border += border;
+    if (line.owner == kCut) sum_.cut_border += border;
     add_area(line.owner, owned * all);
     if (stack_.view && stack_.view->sees(line.owner)) {
       const double facing = dot(normal, stack_.view->normal);
@@ -580,6 +582,7 @@ void add_face(const Line& plane, const Stack& stack, const Outline& outline, dou
   sum.across += t * side * area;
   sum.terms += std::abs(t) * area;
   sum.border += area;
+  if (plane.owner == kCut) sum.cut_border += area;
   sum.moment[plane.owner] += stack.moment(
       Vec3{face.first.x + stack.shear.x * t * area, face.first.y + stack.shear.y * t * area, t * area}, {0, 0, side});
 }

@@ -347,7 +347,7 @@ void Integrals::add(double weight, const Integrals& other) {
   }
   across += weight * other.across;
   terms += weight * other.terms;
-  border += weight * other.border;
+  border += weight * other.border, cut_border += weight * other.cut_border;
   correction += weight * other.correction;
   blur += weight * other.blur;
   for (int i = 0; i < 6; ++i) seen[i] += weight * other.seen[i];

@@ -201,6 +201,7 @@ struct Integrals : Moments {
   double across = 0;             ///< ∫ t N dA along n over all of the surface: equal to the volume
   double terms = 0;              ///< the size of the terms of `across`
   double border = 0;             ///< ∫ dA over all of the surface
+  double cut_border = 0;         ///< ∫ dA over the cuts through bodies
   double correction = 0;         ///< of the volume: first-order effect of the tails of planes
   double blur = 0;               ///< of the volume: the size of the terms in the sums for lines
   std::array<double, 6> seen{};  ///< ∫ 1, u, v, u², uv and v² over the viewed surface
