@@ -91,6 +91,8 @@ def test_a_rounded_hull_within_an_ellipsoid_has_its_own_volume(kinds, seed):
 HALVES = {
     "places of corners that were cut far outside": ("box, rounded hull", 70135),
     "places of corners in a thin polytope": ("hull, cylinder", 70170),
+    "tilt of short edges inside a ball": ("ball, mesh with margin", 10115),
+    "tilt of short edges inside a rounded corner": ("rounded hull, mesh with margin", 61351),
 }
 
 

@@ -188,19 +188,31 @@ void add_border(const SeenEdge& edge, Disc& left, Disc& right) {
   if (edge.other < 0) right.around = false;
 }
 
-/// Adds the error of an edge's part inside. `beside` is the size of the sectors of its two chords.
+/// Adds the error of an edge's part inside. `beside` is the size of the sectors of its two chords. Heights are those of
+/// the planes.
 void add_error(const SeenEdge& edge, const DiscChord& left, const DiscChord& right, bool from_inside, bool to_inside,
-               double beside, double left_height, double r3, double misplaced_corners, double& error) {
+               double beside, double left_height, double right_height, double r3, double misplaced_corners,
+               double& error) {
   const double far = std::abs(edge.first) + std::abs(edge.height) + std::abs(left_height);
   const double misplaced = kPlacing * far + misplaced_corners;
+  const double tilt_left = std::abs(dot(edge.along, edge.n)), tilt_right = std::abs(dot(edge.along, edge.m));
   const auto seen = [&](double t) {
     return edge.through() && t == 0 ? 0 : 1 / std::sqrt(left.distance2(t)) + 1 / std::sqrt(right.distance2(t));
+  };
+  // How fast the angle between both ends changes if the corners move along the edge.
+  const auto turning = [&](const DiscChord& chord) {
+    const auto at = [&](double t, bool inside) {
+      return inside && chord.height != 0 ? chord.height / chord.distance2(t) : 0;
+    };
+    return std::abs(at(chord.to, to_inside) - at(chord.from, from_inside));
   };
   const int ends = !from_inside + !to_inside;
   error += misplaced * beside;
   if (from_inside) error += misplaced * r3 / 2 * seen(left.from);
   if (to_inside) error += (misplaced + kPlacing * edge.length) * r3 / 2 * seen(left.to);
-  error += ends * r3 * (std::abs(dot(edge.along, edge.n)) + std::abs(dot(edge.along, edge.m)) + kPlacing);
+  error += ends * r3 * (tilt_left + tilt_right + kPlacing);
+  error += r3 / 2 *
+           (tilt_left * std::abs(left_height) * turning(left) + tilt_right * std::abs(right_height) * turning(right));
 }
 
 /// An edge between two corners at one place, where more than three faces meet.
@@ -244,8 +256,8 @@ void add_edge(const Edge& edge, const BallAndPolyhedron& at, BallSums& sums) {
   const double beside = left.square * add(of_left, left) + right.square * add(of_right, right);
   if (at.second_moments) add_second_moments(of_left, left), add_second_moments(of_right, right);
   ++sums.characteristic;
-  add_error(seen, of_left, of_right, from_inside, to_inside, beside, left.height, at.r3, at.polyhedron.misplaced,
-            sums.part.error);
+  add_error(seen, of_left, of_right, from_inside, to_inside, beside, left.height, right.height, at.r3,
+            at.polyhedron.misplaced, sums.part.error);
 }
 
 /// A face that has a corner at the ball's centre.
@@ -345,8 +357,9 @@ void finish(const std::vector<Disc>& discs, double r, BallSums& sums) {
 // - If the edge ends in a corner inside, the direction from a disc's middle to the corner has an error: the
 //   misplacement of the corner over its distance. It changes a sector, and the part of the ball above the sector. If
 //   the corner is in the middle of the disc, the error has no bound, because each edge gives another direction.
-// - If the edge ends on the sphere, the formula of the turn assumes planes parallel to the edge. The measured deviation
-//   counts as error.
+// - Misplaced corners tilt the edge against a plane. Corners then move along the edge by the tilt times the height of
+//   the plane over the centre, and ends on the sphere do not. Seen from the disc's middle, the angle between both ends
+//   changes. The measured tilt counts.
 std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius, bool second_moments) {
   thread_local std::vector<Disc> discs;
   thread_local std::vector<char> inside;
