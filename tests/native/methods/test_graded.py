@@ -66,6 +66,7 @@ MENDED = {
     "an end of a cylinder that rushes across slices": ("cylinder, rounded hull", 52012),
     "parallel cylinders as thin as rounding": ("cylinder, cylinder", 70057),
     "parallel cylinders with round ends as thin as rounding": ("capsule, cylinder", 70325),
+    "a cap with the tip of a cone in its middle": ("ball, rounded hull", 50008),
 }
 
 

@@ -536,17 +536,22 @@ class Settling {
     return true;
   }
 
-  /// Sets inside_ to a slice that is not empty: at the origin, or midway between two breakpoints. False if there is
-  /// none.
+  /// Sets inside_ to a slice that is not empty: at the origin, or midway between two breakpoints, or beside that. False
+  /// if there is none.
   bool find_inside(const std::vector<double>& values) {
     // The origin is a point of the common set, but not of every piece.
     if (low_ < 0 && 0 < high_ && holds(0)) {
       inside_ = 0;
       return true;
     }
-    for (size_t i = 0; i + 1 < values.size(); ++i) {
-      inside_ = values[i] + (values[i + 1] - values[i]) / 2;
-      if (holds(inside_)) return true;
+    // The tip of a cone around the centre of a ball is in the middle of a cap of another ball. In that slice, all
+    // planes of the cone meet in a point, and rounding may leave nothing.
+    for (const double share : {0.5, 0.375}) {
+      for (size_t i = 0; i + 1 < values.size(); ++i) {
+        inside_ = values[i] + share * (values[i + 1] - values[i]);
+        if (holds(inside_)) return true;
+      }
+      if (stack_.ball < 0) return false;
     }
     return false;
   }
