@@ -67,6 +67,7 @@ MENDED = {
     "parallel cylinders as thin as rounding": ("cylinder, cylinder", 70057),
     "parallel cylinders with round ends as thin as rounding": ("capsule, cylinder", 70325),
     "a cap with the tip of a cone in its middle": ("ball, rounded hull", 50008),
+    "rounding of two ellipsoids of other sizes": ("ellipsoid, ellipsoid", 70238),
 }
 
 

@@ -73,8 +73,6 @@ std::optional<Measured> measured(const InEllipsoid& of, const slicing::Round& ro
   const Sums& part = result.integral.sums;
   const double volume = part.moments.volume;
   if (!(volume > 0)) return result;
-  // The error of the rules may be larger than their series tell; no error above half of this fraction was seen.
-  constexpr double kOfRules = 2e-13;
   pieces::Totals& totals = result.totals;
   static_cast<Moments&>(totals) = part.moments.along({found->normal, found->x, found->y});
   totals.error = result.integral.error + kRoundings * DBL_EPSILON * (part.blur + volume) + kOfRules * volume +

@@ -182,8 +182,8 @@ void add_second(const Place& place, const PlacedArc& of, const Wanted& wanted, S
 /// most `away` from the foot.
 ///
 /// The mean disc divides both the difference of the slacks and the distance of the centres. A disc that is much smaller
-/// than the other has a small part of both, and little of their rounding. Bodies without walls keep the wider bound of
-/// whole sizes.
+/// than the other has a small part of both, and little of their rounding. Bodies without walls have the wider bound of
+/// whole sizes at first, which covers the rules, too.
 struct Terms {
   std::array<double, 2> slack, centre;  ///< of the first disc and of the second
   double away;
@@ -198,10 +198,10 @@ Terms terms_of_lens(const Place& place, double reach) {
   const double lever = along + chord, difference = size_at(d.difference, t);
   const double slack = size_at(d.slack, t) + difference * lever / apart + away * away + d.misplaced +
                        2 * aside * (centres + along * bend) + 2 * chord * (centres + (aside + lever) * bend);
-  const bool cut = d.cuts > 0;
-  const double centre = centres + chord * bend + (cut ? chord + aside * bend : 0);
+  const bool shared = d.cuts > 0 || d.shared;
+  const double centre = centres + chord * bend + (shared ? chord + aside * bend : 0);
   const auto of = [&](double share) {
-    const double part = cut ? share : 1;
+    const double part = shared ? share : 1;
     return std::array{slack + part * difference, centre + part * size_of_apart};
   };
   const auto [first_slack, first_centre] = of(d.share);
