@@ -113,6 +113,7 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
 
   pieces::PieceSetting setting;
   setting.stretch = &stretch;
+  setting.of_many = polytope_of(other.shape) != nullptr;
   setting.extent = norm(rounded(of_ellipsoid.rounds[0].centre)) + 1;
   pieces::Sums sums;
   sums.patch = pair.patch ? std::optional(*pair.patch) : std::nullopt;

@@ -37,7 +37,7 @@ struct PieceContext {
   const Sums& sums;  ///< over the pieces before
 
   /// The size that missing volume and errors of a piece are compared with.
-  double share_of(double size) const { return piece.around ? kShare * size : size; }
+  double share_of(double size) const { return piece.around || setting.of_many ? kShare * size : size; }
   bool closed(const BestSum& sum, double part = 1) const {
     return sum.open <= part * kClosed * (share_of(sums.totals.volume) + sum.best.integrals.volume);
   }

@@ -107,6 +107,7 @@ struct PieceSetting {
   const EnclosingPolytope* common = nullptr;  ///< no piece lies outside of it
   PatchView view;                             ///< of the patch, if one is summed
   bool areas = true;                          ///< wanted; otherwise, those of an ellipsoid may be bounds
+  bool of_many = false;                       ///< each piece is one of many, whose missing volumes add up
   bool closely = false;                       ///< sample all of every interval
   bool cuts = false;                          ///< also integrate cuts through bodies accurately
   bool many_walls = false;                    ///< the same for two or more rounds: many planes meet their corners
