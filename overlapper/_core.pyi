@@ -1688,20 +1688,25 @@ class ContactSolver:
         `duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.
         """
 
-    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: Sequence[Any] | None = None, motors: numpy.typing.ArrayLike | None = None) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int, float]:
+    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: Sequence[Any] | None = None, motors: numpy.typing.ArrayLike | None = None, constraints: numpy.typing.ArrayLike | None = None) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int, float]:
         """
         The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
-        without the patches and the motors. Rows that are `damped` choose stability over energy; without the argument, no row
+        without the patches, the motors and the constraints. Rows that are `damped` choose stability over energy; without the argument, no row
         does. `ahead` has a pair for each link: the position of its centre of mass after the step, in m, if the coordinates keep
         their velocity, and the quaternion xyzw of its rotation until then. The trees of a simulator need it if there are
         patches. `motors` (m, 4) are rows of a coordinate, a target, a gain from 0 to 1 and the largest force. A motor alone
         changes the velocity v that its coordinate would have without it to (1 - gain) v + target. Motors of the trees of a
         simulator do nothing.
 
+        `constraints` (k, 23) are constraints between two links, which hold as Bullet's do. A row has a key, which is the same in
+        every step; the kind, 0 for a point, 1 fixed, 2 for a slider; the places of the links, -1 for the world; position and
+        quaternion xyzw of the constraint in the inertial frame of each link; the axis of a slider in the frame of the first
+        link; the velocity that corrects an error of position over the error, in 1/s; and the largest force in each direction.
+
         (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
-        last known, (n, 6) force and torque on the links about their centres of mass, the part of patches and motors in the
-        acceleration, and how often the patches were gone through, and the largest change of a slip in the last time, as a
-        fraction of the largest slip.
+        last known, (n, 6) force and torque of patches on the links about their centres of mass, (k, 6) the forces of
+        constraints on their first links, three forces and three torques along their directions, the part of patches, motors and constraints in the acceleration, how often the patches were gone through, and the largest
+        change of a slip in the last time, as a fraction of the largest slip.
         """
 
 def function(core: Any) -> Any:

@@ -82,6 +82,12 @@ class Dynamics(Protocol):
         the simulation's time step.
         """
 
+    def constraints(self, length: float) -> Array | None:
+        """The constraints beside contacts, as `ContactSolver.solve` takes them. None: no constraints.
+
+        They are those of a step of `length` (s).
+        """
+
     def apply(self, wrenches: Array, frames: Sequence[Pose]) -> None:
         """Apply forces and torques (n, 6), about the origins of `frames`, to `links` in the next step."""
 

@@ -145,7 +145,7 @@ def test_a_peg_that_leans_is_pushed_back_by_every_wall():
     assert 0.01 < pushed.min() < pushed.max() < 5  # N: two tenths of a millimetre on a few square centimetres
     # It leans about x, towards what is across.
     across, along, _ = np.abs(frame.forces.force.sum(axis=0))
-    assert across < 1e-6 < 0.5 * pushed.sum() < along
+    assert across < 1e-5 < 0.5 * pushed.sum() < along
 
 
 def test_the_sample_scenes_of_an_installed_package_are_found(tmp_path, monkeypatch):

@@ -294,7 +294,7 @@ def test_a_robot_answers_to_forces_as_the_solver_says(client, file, fixed, link)
     dynamics.solver.place(frames, found, links, np.full(count, 1e6), np.zeros(count), np.full(count, 0.5))
     velocity = dynamics.velocity()
     assert not velocity.any()
-    *_, wrenches, foretold, _sweeps, _residual = dynamics.solver.solve(
+    *_, wrenches, _, foretold, _sweeps, _residual = dynamics.solver.solve(
         STEP, velocity, np.zeros(len(velocity)), np.zeros(count, bool), False
     )
     dynamics.apply(wrenches, frames)

@@ -264,7 +264,7 @@ def test_the_solver_foretells_the_velocities_of_mujoco(damping, substeps):
         solved = dynamics.solver.solve(
             length, velocity, dynamics.acceleration, 0 * count, False, dynamics.ahead(length, velocity)
         )
-        wrenches, ours = solved[5], solved[6]
+        wrenches, ours = solved[5], solved[7]
         dynamics.apply(wrenches, frames)
         if len(found) and not any(damping):
             turned = np.zeros(model.nv)

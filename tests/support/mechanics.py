@@ -297,6 +297,7 @@ class Solution:
     normal: np.ndarray
     directed: np.ndarray
     on_links: np.ndarray
+    constraints: np.ndarray
     acceleration: np.ndarray
     sweeps: int
     residual: float

@@ -60,12 +60,13 @@ Vec3 rotation_vector(const Mat3& turn) {
 }  // namespace
 
 struct ContactSolver::Laws {
-  Pressure pressure;
-  PatchFriction friction;
-  Six wrench;  ///< of pressures, friction and rolling resistance
-  Drift drift;
-  std::optional<Coulomb> rolling{};  ///< normal
-  double relative_damping = 0;       ///< N, see find_relative_damping()
+  Six wrench;                             ///< of pressures, friction and rolling resistance, or of a constraint
+  std::optional<Bilateral> constraint{};  ///< of a row that is no patch: nothing below counts then
+  std::optional<Pressure> pressure{};
+  std::optional<PatchFriction> friction{};
+  std::optional<Coulomb> rolling{};  ///< normal; a patch may have none
+  Drift drift{};
+  double relative_damping = 0;  ///< N, see find_relative_damping()
 
   Three pressures() const { return rolling ? wrench.normal - rolling->wrench() : wrench.normal; }
 };
@@ -126,11 +127,14 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
   return frequency2;
 }
 
-void ContactSolver::make_rows() {
+/// Makes the rows of patches, and those of the constraints of a step.
+void ContactSolver::make_rows(const Step* step) {
   rows_.clear(), pool_.clear();
-  rows_.reserve(patches_.size());
+  rows_.reserve(patches_.size() + (step ? step->constraints.size() : 0));
   for (const ElasticPatch& patch : patches_) add_sides(rows_.emplace_back(patch), patch);
   share_damping();
+  if (!step) return;
+  for (const Constraint& constraint : step->constraints) add_constraint(constraint);
 }
 
 /// Finds the damping along the normals by `recovery`. The patches of two links are damped as one patch, as far as they
@@ -138,7 +142,7 @@ void ContactSolver::make_rows() {
 /// slips, weighted by their forces. This is the slip at the centroid of the whole volume.
 void ContactSolver::share_damping() {
   std::map<std::pair<int, int>, std::vector<int>> of_links;
-  for (int i = 0; i < int(rows_.size()); ++i) {
+  for (int i = 0; i < int(patches_.size()); ++i) {
     const ElasticPatch& patch = patches_[i];
     if (!(patch.recovery > 0 && patch.force > 0)) continue;
     if (patch.area > 0) {
@@ -170,7 +174,7 @@ void ContactSolver::share_damping() {
 /// The damping by the motion of other patches relative to each patch, in N. It is 0 for patches that are damped alone.
 void ContactSolver::find_relative_damping(const Island& island, std::span<const double> velocity,
                                           std::span<Laws> laws) const {
-  for (int i : island.patches) {
+  for (int i : island.rows) {
     laws[i].relative_damping = 0;
     if (rows_[i].damped_with.empty()) continue;
     const double own = slip_of(rows_[i], velocity).normal[0];
@@ -179,25 +183,68 @@ void ContactSolver::find_relative_damping(const Island& island, std::span<const 
   }
 }
 
+/// The velocity of a link's point in all its directions, by the coordinates of its body.
+std::vector<double> ContactSolver::jacobian_of(int link, Vec3 point, double sign) const {
+  std::vector<double> rows(size_t(6) * bodies_.bodies()[bodies_.body_of(link)].coordinates);
+  bodies_.jacobian(link, point, rows);
+  for (double& each : rows) each *= sign;
+  return rows;
+}
+
 void ContactSolver::add_sides(Row& row, const ElasticPatch& patch) {
-  std::vector<double> jacobian, other;
-  const auto jacobian_of = [&](int link, double sign) {
-    std::vector<double> rows(size_t(6) * bodies_.bodies()[bodies_.body_of(link)].coordinates);
-    bodies_.jacobian(link, patch.centroid, rows);
-    for (double& each : rows) each *= sign;
-    return rows;
-  };
   const int a = bodies_.body_of(patch.link_a), b = bodies_.body_of(patch.link_b);
   if (a == b) {
-    jacobian = jacobian_of(patch.link_a, 1), other = jacobian_of(patch.link_b, -1);
+    std::vector<double> jacobian = jacobian_of(patch.link_a, patch.centroid, 1);
+    const std::vector<double> other = jacobian_of(patch.link_b, patch.centroid, -1);
     for (size_t i = 0; i < jacobian.size(); ++i) jacobian[i] += other[i];
     return add_side(row, a, jacobian);
   }
   for (const auto& [link, sign] : {std::pair{patch.link_a, 1.0}, std::pair{patch.link_b, -1.0}}) {
     const int body = bodies_.body_of(link);
     if (bodies_.bodies()[body].links == 1) add_single(row, link, sign, patch.centroid);
-    else add_side(row, body, jacobian_of(link, sign));
+    else add_side(row, body, jacobian_of(link, patch.centroid, sign));
   }
+}
+
+ContactSolver::Row& ContactSolver::add_held(const Held& held) {
+  ElasticPatch none;
+  none.normal = {0, 0, 1};
+  Row& row = rows_.emplace_back(none);
+  row.held = held;
+  return row;
+}
+
+void ContactSolver::add_constraint(const Constraint& constraint) {
+  std::array<Pose, 2> frames;
+  for (int i = 0; i < 2; ++i)
+    if (constraint.links[i] >= 0) frames[i] = bodies_.frame(constraint.links[i]);
+  const Directions along = directions(constraint, frames);
+  std::array<int, 2> bodies{-1, -1};
+  std::array<std::vector<double>, 2> rows;
+  for (int i = 0; i < 2; ++i) {
+    const int link = constraint.links[i];
+    if (link < 0) continue;
+    bodies[i] = bodies_.body_of(link);
+    const size_t n = bodies_.bodies()[bodies[i]].coordinates;
+    const std::vector<double> jacobian = jacobian_of(link, along.points[i], i == 0 ? 1 : -1);
+    rows[i].resize(6 * n);
+    for (size_t r = 0; r < 6; ++r)
+      for (size_t axis = 0; axis < 3; ++axis)
+        for (size_t c = 0; c < n; ++c)
+          rows[i][r * n + c] += along.axes[r][int(axis)] * jacobian[((r < 3 ? 0 : 3) + axis) * n + c];
+  }
+  Row& row = add_held({constraint.key, along.target, constraint.limit});
+  add_between(row, bodies, std::move(rows));
+}
+
+/// Adds the sides of two bodies, which may be the same. -1 is the world, which never moves.
+void ContactSolver::add_between(Row& row, std::array<int, 2> bodies, std::array<std::vector<double>, 2> rows) {
+  if (bodies[0] == bodies[1]) {
+    for (size_t i = 0; i < rows[0].size(); ++i) rows[0][i] += rows[1][i];
+    bodies[1] = -1;
+  }
+  for (int i = 0; i < 2; ++i)
+    if (bodies[i] >= 0) add_rows(row, bodies[i], rows[i]);
 }
 
 /// The motion that a wrench on a body of one link gives to its point of application. Both have the sign of the side.
@@ -226,17 +273,25 @@ void ContactSolver::add_single(Row& row, int link, double sign, Vec3 centroid) {
 }
 
 void ContactSolver::add_side(Row& row, int number, std::span<const double> jacobian) {
+  const size_t n = bodies_.bodies()[number].coordinates;
+  std::vector<double> rows(6 * n);
+  for (size_t c = 0; c < n; ++c) {
+    const auto at = [&](size_t r) { return jacobian[r * n + c]; };
+    const Six slip = row.local({{at(0), at(1), at(2)}, {at(3), at(4), at(5)}});
+    for (size_t i = 0; i < 3; ++i) rows[i * n + c] = slip.normal[i], rows[(i + 3) * n + c] = slip.tangential[i];
+  }
+  add_rows(row, number, rows);
+}
+
+/// Adds a side. `given` are 6 rows: the slip by the coordinates of its body.
+void ContactSolver::add_rows(Row& row, int number, std::span<const double> given) {
   const Multibodies::Body& body = bodies_.bodies()[number];
   const size_t n = body.coordinates, first = pool_.size();
   row.sides[row.sides_used++] = {number, body.first_coordinate, body.coordinates, body.movable, false, 1, {},
                                  first,  first + 6 * n};
   pool_.resize(first + 12 * n);
   double *rows = pool_.data() + first, *answers = rows + 6 * n;
-  for (size_t c = 0; c < n; ++c) {
-    const auto at = [&](size_t r) { return jacobian[r * n + c]; };
-    const Six slip = row.local({{at(0), at(1), at(2)}, {at(3), at(4), at(5)}});
-    for (size_t i = 0; i < 3; ++i) rows[i * n + c] = slip.normal[i], rows[(i + 3) * n + c] = slip.tangential[i];
-  }
+  std::ranges::copy(given, rows);
   if (!body.movable) return;
   const std::span<const double> inverse = bodies_.inverse_mass(number);
   for (size_t c = 0; c < n; ++c)
@@ -378,24 +433,41 @@ Pressure::Damping ContactSolver::damping(size_t patch, std::span<const Six> befo
 
 /// Updates pressures first, then rolling resistance and friction, because pressures limit these. Returns the change of
 /// the slip.
-double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const {
-  const Row& row = rows_[patch];
+double ContactSolver::visit(size_t index, Laws& laws, double duration, std::span<double> velocity) const {
+  const Row& row = rows_[index];
   const Six slip = slip_of(row, velocity), last = laws.wrench;
-  const Three pressures = laws.pressures(), without = slip.normal - duration * (row.normal_by_normal * pressures);
-  const Three pressed = laws.pressure.answer(without, laws.relative_damping);
-  laws.wrench.normal = pressed;
-  if (laws.rolling) {
-    laws.rolling->answer(slip.normal + duration * (row.normal_by_normal * (pressed - pressures)), pressed[0]);
-    laws.wrench.normal = pressed + laws.rolling->wrench();
+  if (laws.constraint) {
+    laws.wrench = six(laws.constraint->answer(numbers(slip), numbers(last)));
+  } else {
+    const Three pressures = laws.pressures(), without = slip.normal - duration * (row.normal_by_normal * pressures);
+    const Three pressed = laws.pressure->answer(without, laws.relative_damping);
+    laws.wrench.normal = pressed;
+    if (laws.rolling) {
+      laws.rolling->answer(slip.normal + duration * (row.normal_by_normal * (pressed - pressures)), pressed[0]);
+      laws.wrench.normal = pressed + laws.rolling->wrench();
+    }
+    const Three normal = laws.wrench.normal - last.normal;
+    const Three tangential = slip.tangential + laws.drift.slip + duration * (row.tangential_by_normal * normal);
+    laws.wrench.tangential = laws.friction->answer(tangential, pressed[0]);
   }
-  const Three normal = laws.wrench.normal - last.normal;
-  const Three tangential = slip.tangential + laws.drift.slip + duration * (row.tangential_by_normal * normal);
-  laws.wrench.tangential = laws.friction.answer(tangential, pressed[0]);
-  const Six change{normal, laws.wrench.tangential - last.tangential};
+  const Six change{laws.wrench.normal - last.normal, laws.wrench.tangential - last.tangential};
   push(row, change, duration, velocity);
+  return largest_change(row, laws, change, duration);
+}
+
+/// The largest change of a velocity of a row, in m/s, if its wrench changes so.
+double ContactSolver::largest_change(const Row& row, const Laws& laws, const Six& change, double duration) const {
   const Six moved = response(row, change);
+  if (laws.constraint) return duration * laws.constraint->speed(numbers(moved));
   return duration * std::max({std::abs(moved.normal[0]), std::abs(moved.tangential[0]), std::abs(moved.tangential[1])});
 }
+
+SixNumbers ContactSolver::numbers(const Six& of) {
+  const Three &n = of.normal, &t = of.tangential;
+  return {n[0], n[1], n[2], t[0], t[1], t[2]};
+}
+
+ContactSolver::Six ContactSolver::six(const SixNumbers& of) { return {{of[0], of[1], of[2]}, {of[3], of[4], of[5]}}; }
 
 ContactSolver::Six ContactSolver::response(const Row& row, const Six& wrench) {
   return {row.normal_by_normal * wrench.normal + row.normal_by_tangential * wrench.tangential,
@@ -421,7 +493,7 @@ std::vector<ContactSolver::Island> ContactSolver::islands() const {
     int alone = -1;  // nothing moves
     int& island = side.moves ? of_root[find(side.body)] : alone;
     if (island < 0) island = int(found.size()), found.emplace_back();
-    found[island].patches.push_back(i);
+    found[island].rows.push_back(i);
   }
   for (int body = 0; body < int(bodies.size()); ++body)
     if (const int island = of_root[find(body)]; island >= 0 && bodies[body].movable)
@@ -440,7 +512,7 @@ class ContactSolver::Newton {
         island_(island),
         system_(sizes(solver, island), pairs(solver, island)),
         afresh_(system_.unknowns() <= kFewCoordinates),
-        patches_(island.patches.size()) {
+        patches_(island.rows.size()) {
     moved_.resize(solver.bodies_.coordinates());
   }
 
@@ -450,7 +522,7 @@ class ContactSolver::Newton {
     bool agreed = false;
     double last = INFINITY, last_but_one = INFINITY;
     for (size_t k = 0; k < patches_.size(); ++k) {
-      const Laws& law = laws[island_.patches[k]];
+      const Laws& law = laws[island_.rows[k]];
       patches_[k].begin = law.wrench, patches_[k].before = law.pressures();
     }
     for (int step = 0; step < kSteps; ++step) {
@@ -469,18 +541,18 @@ class ContactSolver::Newton {
       const double part = search(laws) * (off > 0.9 * last_but_one ? 0.5 : 1);
       last_but_one = last, last = off;
       for (size_t k = 0; k < patches_.size(); ++k) {
-        const int i = island_.patches[k];
+        const int i = island_.rows[k];
         const Six& change = patches_[k].change;
         laws[i].wrench = sum(laws[i].wrench, change, part);
         solver_.push(solver_.rows_[i], change, part * duration, velocity);
       }
     }
     for (size_t k = 0; k < patches_.size(); ++k) {
-      const int i = island_.patches[k];
+      const int i = island_.rows[k];
       const Six present = std::exchange(laws[i].wrench, agreed ? patches_[k].wrench : patches_[k].begin);
       if (!agreed) continue;
       solver_.push(solver_.rows_[i], sum(laws[i].wrench, present, -1), duration, velocity);
-      laws[i].friction.take();
+      if (laws[i].friction) laws[i].friction->take();
       if (laws[i].rolling) laws[i].rolling->take();
     }
     if (!agreed) std::ranges::copy(begun, velocity.begin());
@@ -502,8 +574,8 @@ class ContactSolver::Newton {
     Six slip;
     double more = 0;
     Six wrench, missing;
-    std::array<std::array<double, 6>, 6> by_slip{};
-    std::array<double, 6> by_damping{};
+    SixBySix by_slip{};
+    SixNumbers by_damping{};
     Six slip_change, change;
     double more_change = 0;
   };
@@ -516,7 +588,7 @@ class ContactSolver::Newton {
 
   static std::vector<std::array<int, 2>> pairs(const ContactSolver& solver, const Island& island) {
     std::vector<std::array<int, 2>> found;
-    for (int i : island.patches)
+    for (int i : island.rows)
       if (const Row& row = solver.rows_[i]; row.sides_used == 2 && row.sides[0].moves && row.sides[1].moves)
         found.push_back({place(island, row.sides[0]), place(island, row.sides[1])});
     return found;
@@ -568,11 +640,44 @@ class ContactSolver::Newton {
   };
   Near near(Laws& laws, const Three& before, const Six& slip, double more) const {
     Near found;
-    found.pressed = laws.pressure.held(slip.normal, more, give_, before, laws.pressures());
+    found.pressed = laws.pressure->held(slip.normal, more, give_, before, laws.pressures());
     const double pressing = found.pressed.value[0];
-    found.rubbed = laws.friction.held(slip.tangential + laws.drift.slip, pressing, give_, afresh_);
+    found.rubbed = laws.friction->held(slip.tangential + laws.drift.slip, pressing, give_, afresh_);
     if (laws.rolling) found.rolled = laws.rolling->held(slip.normal, pressing, give_, afresh_);
     return found;
+  }
+
+  Six wrench_near(Laws& laws, const OfPatch& of, const Six& slip, double more) const {
+    if (laws.constraint) return six(laws.constraint->held(numbers(slip), numbers(of.begin), give_).value);
+    return near(laws, of.before, slip, more).wrench();
+  }
+
+  /// Finds the wrench of a row by its law, and how it changes by the slip.
+  void find_law(Laws& laws, OfPatch& of) const {
+    if (laws.constraint) {
+      const auto [value, by_slip] = laws.constraint->held(numbers(of.slip), numbers(of.begin), give_);
+      of.wrench = six(value), of.by_slip = by_slip, of.by_damping = {};
+      return;
+    }
+    const Near found = near(laws, of.before, of.slip, of.more);
+    of.wrench = found.wrench();
+    of.by_slip = {}, of.by_damping = {};
+    const auto put = [&](const Linear& part, int first) {
+      // Its other number is the pressing force.
+      for (int r = 0; r < 3; ++r) {
+        of.by_damping[first + r] += part.by_other[r] * found.pressed.by_other[0];
+        for (int c = 0; c < 3; ++c) {
+          of.by_slip[first + r][first + c] += part.by_slip[r][c];
+          of.by_slip[first + r][c] += part.by_other[r] * found.pressed.by_slip[0][c];
+        }
+      }
+    };
+    put(found.rubbed, 3);
+    put(found.rolled, 0);
+    for (int r = 0; r < 3; ++r) {
+      of.by_damping[r] += found.pressed.by_other[r];
+      for (int c = 0; c < 3; ++c) of.by_slip[r][c] += found.pressed.by_slip[r][c];
+    }
   }
 
   /// Makes the system for a step. Returns the largest change of a slip by a wrench that its law would give now.
@@ -582,33 +687,13 @@ class ContactSolver::Newton {
     right_.assign(system_.unknowns(), 0.0);
     double off = 0;
     for (size_t k = 0; k < patches_.size(); ++k) {
-      const int i = island_.patches[k];
+      const int i = island_.rows[k];
       const Row& row = solver_.rows_[i];
       OfPatch& of = patches_[k];
       of.slip = solver_.slip_of(row, velocity), of.more = laws[i].relative_damping;
-      const Near found = near(laws[i], of.before, of.slip, of.more);
-      of.wrench = found.wrench();
+      find_law(laws[i], of);
       of.missing = sum(of.wrench, laws[i].wrench, -1);
-      of.by_slip = {}, of.by_damping = {};
-      const auto put = [&](const Linear& part, int first) {
-        // Its other number is the pressing force.
-        for (int r = 0; r < 3; ++r) {
-          of.by_damping[first + r] += part.by_other[r] * found.pressed.by_other[0];
-          for (int c = 0; c < 3; ++c) {
-            of.by_slip[first + r][first + c] += part.by_slip[r][c];
-            of.by_slip[first + r][c] += part.by_other[r] * found.pressed.by_slip[0][c];
-          }
-        }
-      };
-      put(found.rubbed, 3);
-      put(found.rolled, 0);
-      for (int r = 0; r < 3; ++r) {
-        of.by_damping[r] += found.pressed.by_other[r];
-        for (int c = 0; c < 3; ++c) of.by_slip[r][c] += found.pressed.by_slip[r][c];
-      }
-      const Six moved = response(row, of.missing);
-      off = std::max({off, duration * std::abs(moved.normal[0]), duration * std::abs(moved.tangential[0]),
-                      duration * std::abs(moved.tangential[1])});
+      off = std::max(off, solver_.largest_change(row, laws[i], of.missing, duration));
       add(row, of, duration);
     }
     return off;
@@ -617,7 +702,7 @@ class ContactSolver::Newton {
   /// Finds the changes of slips and wrenches by the whole step.
   void find_changes() {
     for (size_t k = 0; k < patches_.size(); ++k) {
-      const Row& row = solver_.rows_[island_.patches[k]];
+      const Row& row = solver_.rows_[island_.rows[k]];
       OfPatch& of = patches_[k];
       of.slip_change = solver_.slip_of(row, moved_), of.more_change = 0;
       for (const auto [other, part] : row.damped_with)
@@ -637,10 +722,10 @@ class ContactSolver::Newton {
     const auto power = [&](double part) {
       double sum_of = 0;
       for (size_t k = 0; k < patches_.size(); ++k) {
-        const int i = island_.patches[k];
+        const int i = island_.rows[k];
         const OfPatch& of = patches_[k];
         const Six slip = sum(of.slip, of.slip_change, part);
-        const Six found = near(laws[i], of.before, slip, of.more + part * of.more_change).wrench();
+        const Six found = wrench_near(laws[i], of, slip, of.more + part * of.more_change);
         for (int r = 0; r < 6; ++r)
           sum_of += (at(laws[i].wrench, r) + part * at(of.change, r) - at(found, r)) * at(of.slip_change, r);
       }
@@ -722,26 +807,26 @@ void ContactSolver::extrapolate(Momentum& momentum, const Island& island, std::s
   auto& [before, begun, weight] = momentum;
   double against = before.empty() ? 1 : 0;
   for (size_t j = 0; j < before.size(); ++j) {
-    const Row& row = rows_[island.patches[j]];
-    const Six &now = laws[island.patches[j]].wrench, &last = before[j], &from = begun[j];
+    const Row& row = rows_[island.rows[j]];
+    const Six &now = laws[island.rows[j]].wrench, &last = before[j], &from = begun[j];
     for (int k = 0; k < 3; ++k) {
       against += row.normal_by_normal[k][k] * (from.normal[k] - now.normal[k]) * (now.normal[k] - last.normal[k]);
       against += row.tangential_by_tangential[k][k] * (from.tangential[k] - now.tangential[k]) *
                  (now.tangential[k] - last.tangential[k]);
     }
   }
-  before.resize(island.patches.size()), begun.resize(island.patches.size());
+  before.resize(island.rows.size()), begun.resize(island.rows.size());
   if (against > 0) weight = 1;
   const double next = (1 + std::sqrt(1 + 4 * weight * weight)) / 2, factor = (weight - 1) / next;
   weight = next;
   for (size_t j = 0; j < before.size(); ++j) {
-    Laws& law = laws[island.patches[j]];
+    Laws& law = laws[island.rows[j]];
     const Six more{factor * (law.wrench.normal - before[j].normal),
                    factor * (law.wrench.tangential - before[j].tangential)};
-    push(rows_[island.patches[j]], more, duration, velocity);
+    push(rows_[island.rows[j]], more, duration, velocity);
     before[j] = law.wrench;
     law.wrench = begun[j] = {law.wrench.normal + more.normal, law.wrench.tangential + more.tangential};
-    law.friction.begin(law.wrench.tangential);
+    if (law.friction) law.friction->begin(law.wrench.tangential);
   }
 }
 
@@ -749,7 +834,7 @@ void ContactSolver::extrapolate(Momentum& momentum, const Island& island, std::s
 ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws> laws, const Step& step, double largest,
                                            std::span<double> velocity) const {
   const double duration = step.duration;
-  const int count = int(island.patches.size());
+  const int count = int(island.rows.size());
   Ended ended;
   std::optional<Newton> newton;
   int unknowns = 0;
@@ -762,7 +847,7 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
     changed = 0;
     find_relative_damping(island, velocity, laws);
     for (int k = 0; k < count; ++k) {
-      const int i = island.patches[ended.sweeps % 2 ? count - 1 - k : k];
+      const int i = island.rows[ended.sweeps % 2 ? count - 1 - k : k];
       changed = std::max(changed, visit(i, laws[i], duration, velocity));
     }
     ++ended.sweeps;
@@ -783,7 +868,12 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
 ContactSolver::Solution ContactSolver::solve(const Step& step) {
   std::vector<double> velocity(step.velocity.begin(), step.velocity.end());
   for (size_t i = 0; i < velocity.size(); ++i) velocity[i] += step.duration * step.acceleration[i];
-  return step.motors.empty() ? solve_patches(step, std::move(velocity)) : solve_with_motors(step, std::move(velocity));
+  if (!step.motors.empty()) return solve_with_motors(step, std::move(velocity));
+  if (step.constraints.empty()) return solve_patches(step, std::move(velocity));
+  make_rows(&step);
+  Solution solution = solve_patches(step, std::move(velocity));
+  rows_.erase(rows_.begin() + std::ptrdiff_t(patches_.size()), rows_.end());
+  return solution;
 }
 
 /// Which motors push with their largest force is taken to be as in the last step at first. It is found anew until it
@@ -794,8 +884,7 @@ ContactSolver::Solution ContactSolver::solve_with_motors(const Step& step, std::
   std::map<int, std::vector<Motor>> of_bodies;
   const std::span<const Multibodies::Body> bodies = bodies_.bodies();
   for (Motor motor : step.motors) {
-    const auto after = std::ranges::upper_bound(bodies, motor.coordinate, {}, &Multibodies::Body::first_coordinate);
-    const int number = int(after - bodies.begin()) - 1;
+    const int number = bodies_.body_with(motor.coordinate);
     motor.coordinate -= bodies[number].first_coordinate;
     if (!bodies_.mass(number).empty()) of_bodies[number].push_back(motor);
   }
@@ -815,7 +904,7 @@ ContactSolver::Solution ContactSolver::solve_with_motors(const Step& step, std::
       std::vector<double> before = bodies_.exchange_inverse_mass(number, of.inverse_mass());
       if (round == 0) without[number] = std::move(before);
     }
-    make_rows();
+    make_rows(&step);
     solution = solve_patches(step, start);
     changed = false;
     for (auto& [number, of] : driven) {
@@ -835,13 +924,15 @@ ContactSolver::Solution ContactSolver::solve_with_motors(const Step& step, std::
   return solution;
 }
 
-/// The forces on the coordinates of a body with joints by the patches.
+/// The forces on the coordinates of a body with joints by the patches and the constraints.
 std::vector<double> ContactSolver::forces_on_coordinates(int number, const Solution& solution) const {
   std::vector<double> forces(bodies_.bodies()[number].coordinates);
   const size_t n = forces.size();
   for (size_t i = 0; i < rows_.size(); ++i) {
     const Row& row = rows_[i];
-    const Six wrench = row.local({solution.patches[i].force, solution.patches[i].torque});
+    const size_t count = patches_.size();
+    const Six wrench = i < count ? row.local({solution.patches[i].force, solution.patches[i].torque})
+                                 : six(solution.constraints[i - count]);
     for (int s = 0; s < row.sides_used; ++s) {
       if (row.sides[s].body != number) continue;
       const double* rows = &pool_[row.sides[s].rows];
@@ -856,40 +947,57 @@ std::vector<double> ContactSolver::forces_on_coordinates(int number, const Solut
 ContactSolver::Solution ContactSolver::solve_patches(const Step& step, std::vector<double> velocity) {
   const double h = step.duration;
   const int count = int(rows_.size());
+  const size_t patches = patches_.size();
   std::vector<MovedOn> found;
-  if (step.ahead.empty() && count > 0) found = bodies_.ahead(h, step.velocity);
+  if (step.ahead.empty() && patches > 0) found = bodies_.ahead(h, step.velocity);
   const std::span<const MovedOn> ahead = step.ahead.empty() ? std::span<const MovedOn>(found) : step.ahead;
   std::vector<Laws> laws;
   laws.reserve(count);
   std::vector<Six> before;
   std::vector<Drift> drifts;
-  for (const Row& row : rows_) before.push_back(slip_of(row, step.velocity));
-  for (size_t i = 0; i < rows_.size(); ++i) drifts.push_back(drift(i, step, ahead));
-  for (int i = 0; i < count; ++i) {
+  for (size_t i = 0; i < patches; ++i) before.push_back(slip_of(rows_[i], step.velocity));
+  for (size_t i = 0; i < patches; ++i) drifts.push_back(drift(i, step, ahead));
+  for (size_t i = 0; i < patches; ++i) {
     const ElasticPatch& patch = patches_[i];
     const Row& row = rows_[i];
     const Rule rule = step.damped[i] ? Rule::kDamping : Rule::kKeeping;
     const Pressure::Damping damped = damping(i, before, drifts);
-    laws.push_back({{patch, row.area, row.normal_by_normal, damped, before[i].normal, h, rule},
-                    {patch, row.area, h * row.tangential_by_tangential, step.friction},
-                    known_wrench(i),
-                    drifts[i]});
+    Laws& law = laws.emplace_back();
+    law.wrench = known_wrench(i), law.drift = drifts[i];
+    law.pressure.emplace(patch, row.area, row.normal_by_normal, damped, before[i].normal, h, rule);
+    law.friction.emplace(patch, row.area, h * row.tangential_by_tangential, step.friction);
     if (patch.rolling > 0) {
       const ThreeByThree turns{{{0, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-      laws[i].rolling.emplace(turns, h * row.normal_by_normal, patch.rolling);
+      law.rolling.emplace(turns, h * row.normal_by_normal, patch.rolling);
     }
-    laws[i].wrench.tangential = laws[i].friction.begin(laws[i].wrench.tangential);
+    law.wrench.tangential = law.friction->begin(law.wrench.tangential);
+  }
+  for (size_t i = patches; i < rows_.size(); ++i) {
+    const Row& row = rows_[i];
+    SixBySix mobility{};
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) {
+        mobility[r][c] = h * row.normal_by_normal[r][c], mobility[r][c + 3] = h * row.normal_by_tangential[r][c];
+        mobility[r + 3][c] = h * row.tangential_by_normal[r][c];
+        mobility[r + 3][c + 3] = h * row.tangential_by_tangential[r][c];
+      }
+    Laws& law = laws.emplace_back();
+    law.constraint.emplace(mobility, row.held->target, row.held->limit);
+    const auto last = std::ranges::find(known_held_, row.held->key, &KnownHeld::key);
+    if (last != known_held_.end()) law.wrench = last->wrench;
   }
   std::vector<double> free;
-  for (const Row& row : rows_) {
-    const Six slip = slip_of(row, velocity);
-    free.push_back(std::max({std::abs(slip.normal[0]), std::abs(slip.tangential[0]), std::abs(slip.tangential[1])}));
+  for (size_t i = 0; i < rows_.size(); ++i) {
+    const Six slip = slip_of(rows_[i], velocity);
+    const double sliding = std::max(std::abs(slip.tangential[0]), std::abs(slip.tangential[1]));
+    free.push_back(laws[i].constraint ? laws[i].constraint->missing(numbers(slip))
+                                      : std::max(std::abs(slip.normal[0]), sliding));
   }
   for (int i = 0; i < count; ++i) push(rows_[i], laws[i].wrench, h, velocity);
   Ended all;
   for (const Island& island : islands()) {
     double largest = 0;
-    for (int i : island.patches) largest = std::max(largest, free[i]);
+    for (int i : island.rows) largest = std::max(largest, free[i]);
     const Ended ended = settle(island, laws, step, largest, velocity);
     all = {std::max(all.sweeps, ended.sweeps), std::max(all.residual, ended.residual)};
   }
@@ -904,7 +1012,11 @@ ContactSolver::Solution ContactSolver::solved(std::span<const Laws> laws, std::s
   Solution solution;
   solution.links.assign(bodies_.links(), {Vec3{}, Vec3{}});
   solution.acceleration.assign(velocity.size(), 0);
-  for (size_t i = 0; i < laws.size(); ++i) {
+  for (size_t i = patches_.size(); i < laws.size(); ++i) {
+    solution.constraints.push_back(numbers(laws[i].wrench));
+    push(rows_[i], laws[i].wrench, 1, solution.acceleration);
+  }
+  for (size_t i = 0; i < patches_.size(); ++i) {
     const ElasticPatch& patch = patches_[i];
     const Screw wrench = rows_[i].world(laws[i].wrench);
     const Six slip{{}, slip_of(rows_[i], velocity).tangential + laws[i].drift.slip};
@@ -929,6 +1041,8 @@ void ContactSolver::remember(const Solution& solution, std::span<const Laws> law
                       duration,
                       laws[i].drift.staying});
   std::ranges::sort(known_, {}, &Known::key);
+  known_held_.clear();
+  for (size_t i = patches_.size(); i < rows_.size(); ++i) known_held_.push_back({rows_[i].held->key, laws[i].wrench});
 }
 
 }  // namespace overlapper

@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "forces/constraint.h"
 #include "forces/elastic_patch.h"
 #include "forces/friction.h"
 #include "forces/motor.h"
@@ -21,8 +23,8 @@ struct PatchForce {
 };
 
 /// The forces of patches on bodies within one step, implicit in the velocities at its end. Pressures follow a rule that
-/// keeps energy. Friction follows Coulomb's law. Patches are solved one by one (projected Gauss–Seidel), and all
-/// patches of bodies that touch each other at once (Newton's method) until nothing changes.
+/// keeps energy. Friction follows Coulomb's law. Patches and constraints are solved one by one (projected
+/// Gauss–Seidel), and all those of bodies that are connected at once (Newton's method) until nothing changes.
 class ContactSolver {
  public:
   explicit ContactSolver(Multibodies bodies) : bodies_(std::move(bodies)) {}
@@ -53,13 +55,16 @@ class ContactSolver {
     std::span<const char> damped;          ///< per patch: whether to choose stability over energy (backward Euler)
     Friction friction = Friction::kEllipsoid;
     std::span<const MovedOn> ahead;  ///< the links at the end, with that velocity; found here for bodies with links
-    std::span<const Motor> motors;   ///< only of bodies with links
+    /// Only of bodies with links.
+    std::span<const Motor> motors;
+    std::span<const Constraint> constraints;
   };
 
   struct Solution {
     std::vector<PatchForce> patches;
-    std::vector<std::array<Vec3, 2>> links;  ///< force and torque on each link, about its centre of mass
-    std::vector<double> acceleration;        ///< of all coordinates, by the patches and the motors
+    std::vector<SixNumbers> constraints;     ///< on the first link, along `Directions`
+    std::vector<std::array<Vec3, 2>> links;  ///< force and torque of patches on each link, about its centre of mass
+    std::vector<double> acceleration;        ///< of all coordinates, by the patches, the motors and the constraints
     int sweeps = 0;
     double residual = 0;  ///< the largest change of a slip in the last sweep, over the largest slip without forces
   };
@@ -96,8 +101,16 @@ class ContactSolver {
     double part;
   };
 
+  /// A constraint: its velocity and its largest force.
+  struct Held {
+    std::int64_t key;
+    SixNumbers target;
+    double limit;
+  };
+
+  /// A patch or a constraint. The six numbers of the latter are its directions, the first three of them normal.
   struct Row {
-    Row(const ElasticPatch& patch);
+    explicit Row(const ElasticPatch& patch);
 
     Screw world(const Six& of) const;
     Six local(const Screw& of) const;
@@ -110,6 +123,7 @@ class ContactSolver {
     std::vector<Share> damped_with;  ///< the other patches of the same two links
     /// The change of the slip by a wrench in 1 s: of the normal part by the normal part, and so on.
     ThreeByThree normal_by_normal{}, normal_by_tangential{}, tangential_by_normal{}, tangential_by_tangential{};
+    std::optional<Held> held{};  ///< for a constraint, which has no directions of a patch
   };
 
   /// The inverse of the mass and of the inertia of a body of one link.
@@ -127,9 +141,9 @@ class ContactSolver {
   /// The laws of a patch in a step, and its present wrench.
   struct Laws;
 
-  /// Patches whose bodies touch each other, directly or through others. Bodies that forces do not move do not count.
+  /// Rows whose bodies are connected, directly or through others. Bodies that forces do not move do not count.
   struct Island {
-    std::vector<int> patches;
+    std::vector<int> rows;
     std::vector<int> bodies;
   };
 
@@ -148,8 +162,11 @@ class ContactSolver {
 
   class Newton;
 
-  void make_rows();
+  void make_rows(const Step* step = nullptr);
   void add_sides(Row& row, const ElasticPatch& patch);
+  Row& add_held(const Held& held);
+  void add_constraint(const Constraint& constraint);
+  void add_between(Row& row, std::array<int, 2> bodies, std::array<std::vector<double>, 2> rows);
   void share_damping();
   void find_relative_damping(const Island& island, std::span<const double> velocity, std::span<Laws> laws) const;
   std::vector<Island> islands() const;
@@ -159,18 +176,23 @@ class ContactSolver {
                    std::span<double> velocity) const;
   void add_single(Row& row, int link, double sign, Vec3 centroid);
   void add_side(Row& row, int body, std::span<const double> jacobian);
+  void add_rows(Row& row, int body, std::span<const double> rows);
   Screw answer(const Side& side, const Screw& wrench) const;
   Six slip_of(const Row& row, std::span<const double> velocity) const;
   void push(const Row& row, const Six& wrench, double factor, std::span<double> velocity) const;
   static Six response(const Row& row, const Six& wrench);
+  static SixNumbers numbers(const Six& of);
+  static Six six(const SixNumbers& of);
   Six known_wrench(size_t patch) const;
   double staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const;
   Drift drift(size_t patch, const Step& step, std::span<const MovedOn> ahead) const;
   Pressure::Damping damping(size_t patch, std::span<const Six> before, std::span<const Drift> drifts) const;
+  std::vector<double> jacobian_of(int link, Vec3 point, double sign) const;
   Solution solve_with_motors(const Step& step, std::vector<double> velocity);
   Solution solve_patches(const Step& step, std::vector<double> velocity);
   std::vector<double> forces_on_coordinates(int body, const Solution& solution) const;
-  double visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const;
+  double visit(size_t index, Laws& laws, double duration, std::span<double> velocity) const;
+  double largest_change(const Row& row, const Laws& laws, const Six& change, double duration) const;
   Solution solved(std::span<const Laws> laws, std::span<const double> velocity) const;
   void remember(const Solution& solution, std::span<const Laws> laws, double duration);
 
@@ -183,13 +205,20 @@ class ContactSolver {
   };
   const Known* known(std::int64_t key) const;
 
+  /// The same for a constraint.
+  struct KnownHeld {
+    std::int64_t key;
+    Six wrench;
+  };
+
   Multibodies bodies_;
   std::vector<ElasticPatch> patches_;
   std::vector<Row> rows_;
   std::vector<double> pool_;
-  std::vector<Mobility> mobilities_;  ///< per body
-  std::vector<Known> known_;          ///< of the last step, sorted by key
-  std::vector<signed char> full_;     ///< per coordinate, see MotorsOfBody
+  std::vector<Mobility> mobilities_;   ///< per body
+  std::vector<Known> known_;           ///< of the last step, sorted by key
+  std::vector<KnownHeld> known_held_;  ///< of the last step
+  std::vector<signed char> full_;      ///< per coordinate, see MotorsOfBody
 };
 
 }  // namespace overlapper

@@ -114,6 +114,10 @@ Multibodies::Multibodies(std::span<const std::int64_t> coordinates, std::vector<
   make_room();
 }
 
+int Multibodies::body_with(int coordinate) const {
+  return int(std::ranges::upper_bound(bodies_, coordinate, {}, &Body::first_coordinate) - bodies_.begin()) - 1;
+}
+
 void Multibodies::make_room() {
   frames_.resize(links_.size());
   motions_.resize(coordinates_);

@@ -68,6 +68,7 @@ class Multibodies {
   std::span<const Body> bodies() const { return bodies_; }
   int body_of(int link) const { return body_[link]; }
   int coordinates() const { return coordinates_; }
+  int body_with(int coordinate) const;
 
   /// Takes the motions by all coordinates of trees, and the inverse mass matrices. These have a row of `width` numbers
   /// for each coordinate, which begins with the coordinates of its tree.
@@ -76,6 +77,7 @@ class Multibodies {
   /// Takes the poses of the links, and finds the inverse mass matrices there unless a simulator knows them.
   void place(std::span<const Pose> frames);
 
+  const Pose& frame(int link) const { return frames_[link]; }
   Vec3 centre(int link) const { return frames_[link].translation; }
 
   /// Writes 6 rows: the linear velocity of a link's point, then its angular velocity, per coordinate of its body.

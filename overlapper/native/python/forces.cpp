@@ -3,6 +3,7 @@
 
 #include "batch/batch.h"
 #include "forces/contact_solver.h"
+#include "geometry/wide_pose.h"
 #include "python/arrays.h"
 #include "python/frames.h"
 
@@ -167,8 +168,58 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
   return nb::cast(to_numpy<Vector>(std::move(frequency2), {rows}), nb::rv_policy::move);
 }
 
+std::vector<Motor> to_motors(nb::handle given, size_t coordinates) {
+  std::vector<Motor> motors;
+  if (given.is_none()) return motors;
+  const Doubles rows = to_doubles(given, "motors", "an array of numbers");
+  if (rows.size() % 4 != 0) fail("motors", "must have 4 numbers in a row");
+  for (size_t i = 0; i < rows.size(); i += 4) {
+    const double *row = rows.data() + i, coordinate = row[0], gain = row[2], limit = row[3];
+    if (!(coordinate >= 0 && coordinate < double(coordinates))) fail("motors", "must begin with coordinates");
+    if (!(gain >= 0 && gain <= 1 && limit >= 0 && std::isfinite(row[1])))
+      fail("motors", "must have a finite target, a gain from 0 to 1 and a limit from 0");
+    motors.push_back({int(coordinate), row[1], gain, limit});
+  }
+  return motors;
+}
+
+Mat3 rotation_of(const double* quaternion) {
+  const double *q = quaternion, squared = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  if (!(squared > 0)) fail("constraints", "must have quaternions that are not 0");
+  return rotation_matrix({q[0], q[1], q[2], q[3]});
+}
+
+std::vector<Constraint> to_constraints(nb::handle given, const Multibodies& bodies) {
+  std::vector<Constraint> constraints;
+  if (given.is_none()) return constraints;
+  constexpr size_t kWidth = 23;
+  const Doubles rows = to_doubles(given, "constraints", "an array of numbers");
+  if (rows.size() % kWidth != 0) fail("constraints", "must have 23 numbers in a row");
+  if (rows.size() > 0 && !bodies.has_links()) fail("constraints", "must be empty for the trees of a simulator");
+  for (size_t i = 0; i < rows.size(); i += kWidth) {
+    const double* row = rows.data() + i;
+    if (!std::all_of(row, row + kWidth - 1, [](double each) { return std::isfinite(each); }))
+      fail("constraints", "must be finite");
+    if (!(row[1] >= 0 && row[1] <= 2)) fail("constraints", "must be of a kind from 0 to 2");
+    if (!(row[22] >= 0)) fail("constraints", "must have a limit from 0");
+    Constraint& made = constraints.emplace_back();
+    made.key = std::int64_t(row[0]), made.kind = Constraint::Kind(int(row[1]));
+    for (size_t side : {0, 1}) {
+      const double* at = row + 4 + 7 * side;
+      if (!(row[2 + side] >= -1 && row[2 + side] < bodies.links())) fail("constraints", "must be between links, or -1");
+      made.links[side] = int(row[2 + side]);
+      made.frames[side] = {rotation_of(at + 3), {at[0], at[1], at[2]}};
+    }
+    made.axis = {row[18], row[19], row[20]};
+    if (made.kind == Constraint::Kind::kSlider && !(norm2(made.axis) > 0)) fail("constraints", "must have an axis");
+    made.correction = row[21], made.limit = row[22];
+  }
+  return constraints;
+}
+
 nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_given, nb::handle acceleration_given,
-                nb::handle damped_given, bool distributed, nb::handle ahead_given, nb::handle motors_given) {
+                nb::handle damped_given, bool distributed, nb::handle ahead_given, nb::handle motors_given,
+                nb::handle constraints_given) {
   const size_t coordinates = solver.bodies().coordinates(), count = solver.patches().size();
   const auto velocity = numbers(velocity_given, "velocity", coordinates);
   const auto acceleration = numbers(acceleration_given, "acceleration", coordinates);
@@ -186,23 +237,13 @@ nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_give
   } else if (count > 0 && !solver.bodies().has_links()) {
     fail("ahead", "must be given for the trees of a simulator");
   }
-  std::vector<Motor> motors;
-  if (!motors_given.is_none()) {
-    const Doubles rows = to_doubles(motors_given, "motors", "an array of numbers");
-    if (rows.size() % 4 != 0) fail("motors", "must have 4 numbers in a row");
-    for (size_t i = 0; i < rows.size(); i += 4) {
-      const double *row = rows.data() + i, coordinate = row[0], gain = row[2], limit = row[3];
-      if (!(coordinate >= 0 && coordinate < double(coordinates))) fail("motors", "must begin with coordinates");
-      if (!(gain >= 0 && gain <= 1 && limit >= 0 && std::isfinite(row[1])))
-        fail("motors", "must have a finite target, a gain from 0 to 1 and a limit from 0");
-      motors.push_back({int(coordinate), row[1], gain, limit});
-    }
-  }
+  const std::vector<Motor> motors = to_motors(motors_given, coordinates);
+  const std::vector<Constraint> constraints = to_constraints(constraints_given, solver.bodies());
   ContactSolver::Solution solution;
   {
     const nb::gil_scoped_release release;
     solution = solver.solve({duration, velocity, acceleration, damped,
-                             distributed ? Friction::kDistributed : Friction::kEllipsoid, ahead, motors});
+                             distributed ? Friction::kDistributed : Friction::kEllipsoid, ahead, motors, constraints});
   }
   std::vector<Vec3> force, torque, slip, normal;
   for (const PatchForce& each : solution.patches)
@@ -212,16 +253,18 @@ nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_give
     normal.push_back(each.normal), directed.push_back(each.area > 0 || !(each.force > 0));
   std::vector<double> links;
   for (const auto& [f, t] : solution.links) links.insert(links.end(), {f.x, f.y, f.z, t.x, t.y, t.z});
-  const size_t rows = solution.links.size();
+  std::vector<double> held;
+  for (const SixNumbers& each : solution.constraints) held.insert(held.end(), each.begin(), each.end());
+  const size_t rows = solution.links.size(), constrained = solution.constraints.size();
   const auto array = [](const std::vector<Vec3>& values) { return to_numpy(std::span<const Vec3>(values)); };
   using Flags = nb::ndarray<nb::numpy, const bool, nb::ndim<1>>;
   auto* flags = new std::vector<char>(std::move(directed));
   const nb::capsule owner(flags, [](void* p) noexcept { delete static_cast<std::vector<char>*>(p); });
-  return nb::make_tuple(array(force), array(torque), array(slip), array(normal),
-                        Flags(reinterpret_cast<const bool*>(flags->data()), {count}, owner),
-                        to_numpy<Matrix>(std::move(links), {rows, 6}),
-                        to_numpy<Vector>(std::move(solution.acceleration), {coordinates}), solution.sweeps,
-                        solution.residual);
+  return nb::make_tuple(
+      array(force), array(torque), array(slip), array(normal),
+      Flags(reinterpret_cast<const bool*>(flags->data()), {count}, owner),
+      to_numpy<Matrix>(std::move(links), {rows, 6}), to_numpy<Matrix>(std::move(held), {constrained, 6}),
+      to_numpy<Vector>(std::move(solution.acceleration), {coordinates}), solution.sweeps, solution.residual);
 }
 
 /// Rows of lengths and angles: of patches, and of links.
@@ -354,26 +397,33 @@ rad. (n, 2): the same for the centre of mass of each link in the world.)");
 `duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.)");
   cls.def(
       "solve", &solve, "duration"_a, "velocity"_a, "acceleration"_a, "damped"_a.none(), "distributed"_a,
-      "ahead"_a.none() = nb::none(), "motors"_a.none() = nb::none(),
+      "ahead"_a.none() = nb::none(), "motors"_a.none() = nb::none(), "constraints"_a.none() = nb::none(),
       nb::sig("def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: "
               "numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: "
-              "collections.abc.Sequence[typing.Any] | None = None, motors: numpy.typing.ArrayLike | None = None) -> "
+              "collections.abc.Sequence[typing.Any] | None = None, motors: numpy.typing.ArrayLike | None = None, "
+              "constraints: numpy.typing.ArrayLike | None = None) -> "
               "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], "
+              "numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.float64], int, float]"),
       R"(The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
-without the patches and the motors. Rows that are `damped` choose stability over energy; without the argument, no row
+without the patches, the motors and the constraints. Rows that are `damped` choose stability over energy; without the argument, no row
 does. `ahead` has a pair for each link: the position of its centre of mass after the step, in m, if the coordinates keep
 their velocity, and the quaternion xyzw of its rotation until then. The trees of a simulator need it if there are
 patches. `motors` (m, 4) are rows of a coordinate, a target, a gain from 0 to 1 and the largest force. A motor alone
 changes the velocity v that its coordinate would have without it to (1 - gain) v + target. Motors of the trees of a
 simulator do nothing.
 
+`constraints` (k, 23) are constraints between two links, which hold as Bullet's do. A row has a key, which is the same in
+every step; the kind, 0 for a point, 1 fixed, 2 for a slider; the places of the links, -1 for the world; position and
+quaternion xyzw of the constraint in the inertial frame of each link; the axis of a slider in the frame of the first
+link; the velocity that corrects an error of position over the error, in 1/s; and the largest force in each direction.
+
 (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
-last known, (n, 6) force and torque on the links about their centres of mass, the part of patches and motors in the
-acceleration, and how often the patches were gone through, and the largest change of a slip in the last time, as a
-fraction of the largest slip.)");
+last known, (n, 6) force and torque of patches on the links about their centres of mass, (k, 6) the forces of
+constraints on their first links, three forces and three torques along their directions, the part of patches, motors and constraints in the acceleration, how often the patches were gone through, and the largest
+change of a slip in the last time, as a fraction of the largest slip.)");
 }
 
 }  // namespace overlapper::python

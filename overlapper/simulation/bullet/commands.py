@@ -31,6 +31,8 @@ AIMS = {
 POSITION_GAIN = 2
 
 MAX_FORCE, DEFAULT_MAX_FORCE = 10, 500.0  # of getConstraintInfo
+# The defaults of pybullet for two numbers that it does not report: `erp`, and `solverResidualThreshold` in m/s squared.
+ERROR_REDUCTION, THRESHOLD = 0.2, 1e-7
 
 Command = tuple[str, Arguments]
 
@@ -77,6 +79,10 @@ class Commands:
         self._momentary: list[Command] = []
         self.servos: dict[tuple[int, int], Servo] = {}
         """The motors that are known, by body and joint."""
+        self.error_reduction = ERROR_REDUCTION
+        """The fraction of an error of position that constraints remove in a step, as far as it was heard."""
+        self.threshold: float | None = None
+        """The solverResidualThreshold that the script has set, as far as it was heard."""
         self._length = 0.0  # of the steps for which the lasting commands were last repeated
 
     def learn(self) -> None:
@@ -91,6 +97,10 @@ class Commands:
             if force != DEFAULT_MAX_FORCE and constraint not in self._lasting:
                 told = {"userConstraintUniqueId": constraint, "maxForce": force, "physicsClientId": client}
                 self._keep([constraint], ("changeConstraint", told))
+
+    def changes(self) -> dict[int, Arguments]:
+        """The arguments of changeConstraint by constraint, as far as they are known."""
+        return {key: arguments for key, (name, arguments) in self._lasting.items() if name == "changeConstraint"}
 
     def prepare(self, length: float, first: bool, share: float = 1.0) -> None:
         """Repeat the commands for a substep of this `length` (s), the `first` of a step or a later one.
@@ -127,6 +137,9 @@ class Commands:
             self.states.append(("restored", arguments.get("stateId")))
         elif name == "removeState":
             self.states.append(("removed", arguments["stateUniqueId"]))
+        if name == "setPhysicsEngineParameter":
+            self.error_reduction = arguments.get("erp", self.error_reduction)
+            self.threshold = arguments.get("solverResidualThreshold", self.threshold)
         if name == "stepSimulation":
             self.stepped()
         if name not in COMMANDS:
@@ -151,6 +164,7 @@ class Commands:
         else:
             self._lasting, self._momentary = {}, []
             self.servos.clear()
+            self.error_reduction, self.threshold = ERROR_REDUCTION, None
         # pybullet took the command for the script's step length, which is not that of our substeps.
         self._length = 0.0
 

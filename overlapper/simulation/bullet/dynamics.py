@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import repeat
 from typing import Any
 
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from overlapper import _core
 from overlapper.quaternion import rotated
 from overlapper.simulation.bullet.calls import unheard
-from overlapper.simulation.bullet.commands import Servo
+from overlapper.simulation.bullet.commands import Commands
+from overlapper.simulation.bullet.constraints import constraints
 from overlapper.simulation.bullet.joints import joint_between
 from overlapper.simulation.bullet.other_forces import LearntForces
 from overlapper.simulation.model import BASE, Array
@@ -33,15 +34,13 @@ Known = tuple[list[Any], _core.ContactSolver]
 class BulletDynamics:
     """See `Dynamics`: the links of some bodies, base by base, and the `solver` that knows their masses and joints.
 
-    `links` are (body, link) in the solver's order, and `place` is the index of each. `servos` are the motors that are
-    known, by body and joint. They may change.
+    `links` are (body, link) in the solver's order, and `place` is the index of each. `commands` knows motors, and
+    changes of constraints.
     """
 
-    def __init__(
-        self, client: int, bodies: Sequence[int], servos: Mapping[tuple[int, int], Servo] | None = None
-    ) -> None:
+    def __init__(self, client: int, bodies: Sequence[int], commands: Commands | None = None) -> None:
         self._client = client
-        self._servos = {} if servos is None else servos
+        self._commands = commands or Commands(client)
         self._joints = {id: [*range(pybullet.getNumJoints(id, client))] for id in bodies}
         self.links = [(id, link) for id, joints in self._joints.items() for link in (BASE, *joints)]
         self.place = {each: k for k, each in enumerate(self.links)}
@@ -190,14 +189,21 @@ class BulletDynamics:
         return velocity
 
     def motors(self, length: float, share: float) -> Array | None:
-        if not self._servos:
+        servos = self._commands.servos
+        if not servos:
             return None
         rows = []
         for id, joint, at, coordinate in self._positions:
-            servo = self._servos.get((id, joint))
+            servo = servos.get((id, joint))
             if servo and servo.force > 0 and math.isfinite(at):
                 rows.append((coordinate, *servo.in_a_step(at, length, share)))
         return np.array(rows).reshape(-1, 4)
+
+    def constraints(self, length: float) -> Array | None:
+        if not pybullet.getNumConstraints(self._client):
+            return None
+        commands = self._commands
+        return constraints(self._client, self.place, commands.changes(), commands.error_reduction, length)
 
     def ahead(self, duration: float, velocity: Array) -> None:
         return None

@@ -8,7 +8,7 @@ from weakref import WeakValueDictionary
 import pybullet
 
 from overlapper.simulation.bullet.calls import BEGINS, listen, replace_steps, tell, unheard, unlisten
-from overlapper.simulation.bullet.commands import Commands
+from overlapper.simulation.bullet.commands import THRESHOLD, Commands
 from overlapper.simulation.bullet.dynamics import BulletDynamics
 from overlapper.simulation.bullet.memory import Memory
 from overlapper.simulation.bullet.recorder import Recorder
@@ -39,7 +39,7 @@ class Stepping:
         self._length = 0.0  # of the simulator's steps, within a step
 
     def dynamics(self, bodies: Sequence[int]) -> BulletDynamics:
-        self._dynamics = BulletDynamics(self._client, bodies, self._commands.servos)
+        self._dynamics = BulletDynamics(self._client, bodies, self._commands)
         return self._dynamics
 
     def resumed(self, others: OtherForces) -> OtherForces | None:
@@ -70,6 +70,7 @@ class Stepping:
         if pybullet.isConnected(self._client):
             self._response.turn_on(self._recorder)
             self._commands.prepare(time_step(self._client), first=True)
+            self._set_threshold(THRESHOLD)
 
     def pose(self) -> None:
         return  # poses are always up to date
@@ -79,6 +80,9 @@ class Stepping:
     def begin(self, length: float, duration: float, first: bool) -> None:
         self._set(length, duration if first else self._length)
         self._commands.prepare(length, first, share=length / duration)
+        # Otherwise Bullet ends its iterations while constraints of unequal masses still move by some mm/s.
+        if first and pybullet.getNumConstraints(self._client):
+            self._set_threshold(0.0)
 
     def step(self) -> None:
         unheard("stepSimulation")(self._client)
@@ -92,6 +96,12 @@ class Stepping:
         self._length = length
         if length != before:
             pybullet.setTimeStep(length, self._client)
+
+    def _set_threshold(self, default: float) -> None:
+        """Set Bullet's threshold for the end of its iterations, unless the script has set one."""
+        heard = self._commands.threshold
+        set_parameter = unheard("setPhysicsEngineParameter")
+        set_parameter(solverResidualThreshold=default if heard is None else heard, physicsClientId=self._client)
 
     def announce_begin(self) -> None:
         tell(BEGINS, {"physicsClientId": self._client})

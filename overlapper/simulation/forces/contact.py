@@ -113,14 +113,16 @@ class VolumetricContact:
     each mj_step is one substep.
 
     In pybullet, a `Bodies` with a recorder knows which pairs a script has filtered. Without a recorder, filtered pairs
-    are pushed apart, too. The solver knows the motors of single joints that the script commands within the `with`,
-    or that a recorder has heard. All other forces on the bodies (gravity, other motors, constraints, forces of the
-    script) are assumed to be as in the substep before. Within the `with`, the script's commands to motors and
-    constraints and the forces that it applies are given again in each substep. So they last for the whole step,
-    though pybullet keeps them as impulses. Gains of motors are those of a whole step, too. A motor that was
-    commanded before the `with` is stronger by the number of substeps, unless a recorder knows the command. After
-    `restoreState`, bodies move as they did after `saveState`, to the last bit, if both are called within the
-    `with`. For a state in a file, or for other masses than at that time, the solver begins anew.
+    are pushed apart, too. The solver knows constraints between links other than gears, and the motors of single joints
+    that the script commands within the `with`, or that a recorder has heard. All other forces on the bodies (gravity,
+    other motors, forces of the script) are assumed to be as in the substep before. If there are constraints,
+    solverResidualThreshold is 0 within the `with`, and pybullet's default afterwards. A threshold that a script has set
+    and a listener has heard is kept. Within the `with`, the script's commands to motors and constraints and the forces
+    that it applies are given again in each substep. So they last for the whole step, though pybullet keeps them as
+    impulses. Gains of motors are those of a whole step, too. A motor that was commanded before the `with` is stronger
+    by the number of substeps, unless a recorder knows the command. After `restoreState`, bodies move as they did after
+    `saveState`, to the last bit, if both are called within the `with`. For a state in a file, or for other masses than
+    at that time, the solver begins anew.
 
     In MuJoCo, all other forces are known, because MuJoCo computes them first. Its contacts can only be turned off for
     all pairs at once, so `pairs` must contain all pairs that it lets collide. The flag belongs to the model: other data
@@ -504,7 +506,7 @@ class VolumetricContact:
             self._told.of_substeps(self._contacts, damped, frequency2, duration, planned)
         wrenches: Array
         dynamics = self._masses.dynamics
-        force, torque, slip, normal, directed, wrenches, ours, self.sweeps, residual = dynamics.solver.solve(
+        force, torque, slip, normal, directed, wrenches, _, ours, self.sweeps, residual = dynamics.solver.solve(
             duration,
             velocity,
             other,
@@ -512,6 +514,7 @@ class VolumetricContact:
             self._layers.distributed,
             dynamics.ahead(duration, velocity) if len(self._contacts) else None,
             dynamics.motors(duration, duration / self.bodies.time_step),
+            dynamics.constraints(duration),
         )
         self._found = Forces(
             self._contacts, force, torque, slip, normal, directed, self._stiffness, self._frame, residual

@@ -143,6 +143,9 @@ class MujocoDynamics:
     def motors(self, length: float, share: float) -> None:
         return None  # MuJoCo computes their forces before those of contacts
 
+    def constraints(self, length: float) -> None:
+        return None  # the same holds for them
+
     def ahead(self, duration: float, velocity: Array) -> list[Pose]:
         data, later = self._data, self._later
         later.qpos[:] = data.qpos

@@ -58,7 +58,7 @@ def test_a_motor_pushes_with_its_largest_force_if_that_does_not_suffice(forwards
     for _ in range(2):
         assert weak.solve().velocity[6] == pytest.approx(forwards * 3 * H / inertia, rel=1e-9)
     close = replace(weak, motors=[(6, forwards * 1e-3, 1, 3.0)])
-    near = weak.solver.solve(H, np.zeros(7), np.zeros(7), None, False, motors=close.motors)[6]
+    near = weak.solver.solve(H, np.zeros(7), np.zeros(7), None, False, motors=close.motors)[7]
     assert H * near[6] == pytest.approx(forwards * 1e-3, rel=1e-9)
 
 
@@ -68,7 +68,7 @@ def test_motors_change_nothing_for_the_next_step_without_them():
     after.solve()
     first = alone.solve()
     told = after.solver.solve(H, np.zeros(7), np.zeros(7), None, False)
-    assert told[6] == pytest.approx(first.acceleration, rel=1e-9)
+    assert told[7] == pytest.approx(first.acceleration, rel=1e-9)
 
 
 def test_a_motor_of_what_moves_no_mass_does_nothing():
