@@ -64,7 +64,7 @@ MAKERS = (
     of_results("steps", "*/steps.csv", "steps.png", by=("speed/steps_page",)),
     of_results(
         "chart",
-        "*/[gs][rp]*.csv",
+        "*/[gs][rp][oe]*.csv",
         *("speed.png", "speed_sizes.png", "speed_families.png"),
         by=("speed/page", "harness/peers"),
     ),
