@@ -187,7 +187,7 @@ build/torch/dev: pyproject.toml | $(VENV)/dev
 	@$(VENV)/bin/python -m venv build/torch
 	@$(VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"), "import _editable_skbc_overlapper", sep="\n")' \
 	  >"$$(build/torch/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/others.pth"
-	@build/torch/bin/python -m pip install --quiet --disable-pip-version-check torch
+	@build/torch/bin/python -m pip install --quiet --disable-pip-version-check --no-compile torch
 	@touch $@
 
 # Tries each Python on PATH, as the first may be a pyenv shim that does not run.
