@@ -130,7 +130,7 @@ format: $(VENV)/dev ## write Python and C++ as the formatters have it
 hooks: $(VENV)/dev ## let every commit be checked and formatted before it is made
 	@$(VENV)/bin/pre-commit install
 
-ci: ## all that a change must pass (about 30 minutes on 2 cores)
+ci: ## all that a change must pass (30 to 40 minutes on 2 cores)
 	@.ci/run
 
 clean: ## remove environments, builds and what was written to out/
