@@ -11,8 +11,8 @@ namespace overlapper {
 using SixNumbers = std::array<double, 6>;
 using SixBySix = std::array<SixNumbers, 6>;
 
-/// A constraint between two links, as Bullet has them: a point of one link stays at a point of the other (kPoint), the
-/// links do not move relative to each other (kFixed), or only along an axis (kSlider).
+/// A constraint between two links, as in Bullet. With kPoint, a point of one link stays at a point of the other. With
+/// kFixed, the links do not move relative to each other. With kSlider, they only move along an axis.
 struct Constraint {
   enum class Kind { kPoint, kFixed, kSlider };
 

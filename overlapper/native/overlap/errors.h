@@ -73,7 +73,7 @@ double error_of_integrated_inertia(const MeasuresAndInertia& values, const Sprea
 
 /// m²: upper bound of the squared distance R² of the points of a convex set from its centroid.
 ///
-/// The centroid of a solid is at least a quarter of the width from either side, so the set is at least w = 4 R / 3 wide
+/// The centroid of a solid is at least a quarter of the width from either side. So the set is at least w = 4 R / 3 wide
 /// along the line to its farthest point. ∫ x² dV along a line is least for a double cone: w² / 40 of the volume. So V
 /// R² is at most 45 / 2 of ∫ |x|² dV, which is half of the trace.
 double most_distance2(const Mat3& inertia, double volume);

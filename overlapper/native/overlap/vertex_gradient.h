@@ -14,7 +14,7 @@ struct VertexGradient {
   std::vector<double> centroid_error;  ///< bound of the error of each entry; empty unless wanted
 };
 
-/// What vertex_gradients() finds apart from the derivatives of the volume.
+/// The results of vertex_gradients() besides the derivatives of the volume.
 struct Wanted {
   bool errors = false, centroid = false;
 };

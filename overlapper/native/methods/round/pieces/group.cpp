@@ -14,7 +14,7 @@
 namespace overlapper::pieces {
 namespace {
 
-/// What one piece of each body leaves of the common set, with owners by kFirstBody.
+/// The common set of one piece of each body, with owners by kFirstBody.
 struct CommonPart {
   std::vector<Round> rounds;
   std::vector<Wall> walls;

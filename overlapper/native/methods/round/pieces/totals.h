@@ -24,10 +24,9 @@ struct Totals : Moments {
   double open = 0;        ///< m³: possibly missing volume of pieces whose area vectors do not sum to zero
   Moments sizes;          ///< sizes of the terms of an ellipsoid's moments
   Vec3 pull, moment;
-  Vec3 unbalanced;  ///< the sum of both bodies' area vectors: zero if no piece is missing
-  // What sliced pieces without their cuts add to `border`, and their whole surfaces, which are closed, to `unbalanced`.
-  double closed_border = 0;
-  Vec3 left;
+  Vec3 unbalanced;           ///< the sum of both bodies' area vectors: zero if no piece is missing
+  double closed_border = 0;  ///< m²: the part of `border` from sliced pieces, without their cuts
+  Vec3 left;                 ///< the part of `unbalanced` from the whole surfaces of sliced pieces, which are closed
 
   void add(const Totals& piece) {
     Moments::operator+=(piece);
