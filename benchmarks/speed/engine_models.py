@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -61,19 +61,19 @@ def models_of(folder: Path) -> Iterator[mujoco.MjModel]:
 def depths(bodies: Bodies) -> dict[tuple[int, int], float]:
     """The depth of each pair of geoms that overlap, m. A height field has the largest depth of its prisms."""
     bodies.update()
-    found: dict[tuple[int, int], float] = {}
-    for contact in bodies.overlaps():
-        if contact.overlap:
-            pair = min(contact.geomA, contact.geomB), max(contact.geomA, contact.geomB)
-            found[pair] = max(found.get(pair, 0.0), contact.overlap.depth)
-    return found
+    return deepest((each.geomA, each.geomB, each.overlap.depth) for each in bodies.overlaps() if each.overlap)
 
 
 def contact_depths(data: mujoco.MjData) -> dict[tuple[int, int], float]:
     """The depth of the deepest contact of each pair of geoms, m, where MuJoCo's distance is negative."""
-    found: dict[tuple[int, int], float] = {}
-    for (a, b), distance in zip(data.contact.geom.tolist(), data.contact.dist.tolist()):
-        if distance < 0:
-            pair = min(a, b), max(a, b)
-            found[pair] = max(found.get(pair, 0.0), -distance)
-    return found
+    contacts = zip(data.contact.geom.tolist(), data.contact.dist.tolist())
+    return deepest((a, b, -distance) for (a, b), distance in contacts if distance < 0)
+
+
+def deepest(found: Iterable[tuple[int, int, float]]) -> dict[tuple[int, int], float]:
+    """The largest depth of each pair."""
+    depth: dict[tuple[int, int], float] = {}
+    for a, b, each in found:
+        pair = min(a, b), max(a, b)
+        depth[pair] = max(depth.get(pair, 0.0), each)
+    return depth
