@@ -15,12 +15,15 @@ import math
 import warnings
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pybullet as p
 from contact_experiments import HALF, POSES, SQUARE, STEP, G
+from shapely import Polygon
 
 from forces.worlds import ENGINES, Body, Engine, Material
 from harness import results
@@ -47,15 +50,13 @@ def sunk(half: float, material: Material) -> float:
     return half - G / (material.stiffness * (2 * HALF) ** 2)
 
 
-def bounce(pose: str) -> Callable[[Start], tuple[float, Engine]]:
+def bounce(pose: str) -> Callable[[Start], float]:
     """The energy that a cube gains or loses by a bounce, over that of its drop of 5 cm."""
 
-    def of(start: Start) -> tuple[float, Engine]:
-        turn = np.array(POSES[pose])
-        x, y, z, w = turn
-        down = np.abs([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]).sum()
+    def of(start: Start) -> float:
+        down = np.abs(p.getMatrixFromQuaternion(POSES[pose])[6:]).sum()
         drop, low = 0.05, HALF * down
-        cube = Body("box", (HALF,) * 3, (0, 0, low + drop), tuple(turn))
+        cube = Body("box", (HALF,) * 3, (0, 0, low + drop), POSES[pose])
         engine = start([cube], Material(friction=0, elastic=True, stiffness=1e7))
         inertia = 2 / 3 * HALF**2
 
@@ -66,21 +67,21 @@ def bounce(pose: str) -> Callable[[Start], tuple[float, Engine]]:
 
         before = G * (low + drop)
         engine.run(44 * STEP)
-        return abs(energy() - before) / (G * drop), engine
+        return abs(energy() - before) / (G * drop)
 
     return of
 
 
-def slide(start: Start) -> tuple[float, Engine]:
+def slide(start: Start) -> float:
     """How far a flat box slides that starts with 1 m/s: v²/2µg."""
     material, speed = Material(), 1.0
     engine = start([Body("box", (HALF, HALF, 0.01), (0, 0, sunk(0.01, material)), velocity=(speed, 0, 0))], material)
     engine.run(0.5)
     way = engine.position(0)[0] + speed * STEP / engine.substeps / 2
-    return abs(way / (speed**2 / (2 * material.friction * G)) - 1), engine
+    return abs(way / (speed**2 / (2 * material.friction * G)) - 1)
 
 
-def spin(start: Start) -> tuple[float, Engine]:
+def spin(start: Start) -> float:
     """The angle by which a flat box turns that starts with 20 rad/s: Iω²/2µmgρ."""
     material, speed, angle = Material(spinning=True), 20.0, 0.0
     engine = start([Body("box", (HALF, HALF, 0.01), (0, 0, sunk(0.01, material)), spin=(0, 0, speed))], material)
@@ -90,89 +91,81 @@ def spin(start: Start) -> tuple[float, Engine]:
         before = engine.velocity(0)[1][2]
         engine.run(STEP)
         angle += (before + engine.velocity(0)[1][2]) / 2 * STEP
-    return abs(angle / (speed * stop / 2) - 1), engine
+    return abs(angle / (speed * stop / 2) - 1)
 
 
-def roll(start: Start) -> tuple[float, Engine]:
+def roll(start: Start) -> float:
     """The acceleration of a ball that rolls down a slope of 10 degrees: 5/7 g sin."""
     angle = math.radians(10)
-    with start([Body("ball", HALF, (0, 0, HALF))], Material(stiffness=1e9), (0, 0, -G * math.cos(angle))) as level:
-        level.run(1)
-        height = level.position(0)[2]  # at rest, which no engine would come to without dissipation
+    level = start([Body("ball", HALF, (0, 0, HALF))], Material(stiffness=1e9), (0, 0, -G * math.cos(angle)))
+    level.run(1)
+    height = level.position(0)[2]  # at rest, which no engine would come to without dissipation
     engine = start([Body("ball", HALF, (0, 0, height))], Material(stiffness=1e9, dissipation=0), slope(angle))
     engine.run(0.5)
-    return abs(engine.velocity(0)[0][0] / 0.5 / (5 / 7 * G * math.sin(angle)) - 1), engine
+    return abs(engine.velocity(0)[0][0] / 0.5 / (5 / 7 * G * math.sin(angle)) - 1)
 
 
-def threshold(engines: list[Engine], expected: list[float], body: int) -> float:
-    """The largest error of an acceleration along the slope, over g, after half a second to settle."""
+def on_slopes(start: Start, bodies: list[Body], material: Material, friction: float) -> float:
+    """A body on slopes 1 % below and 1 % above its friction: it stays, or slides as the textbook says.
+
+    The larger error of both accelerations along the slope, over g, after half a second to settle.
+    """
     errors = []
-    for engine, acceleration in zip(engines, expected):
+    for share in (0.99, 1.01):
+        angle = math.atan(share * friction)
+        expected = max(0.0, G * (math.sin(angle) - friction * math.cos(angle)))
+        engine = start(bodies, material, slope(angle))
         engine.run(0.5)
-        before = engine.velocity(body)[0][0]
+        before = engine.velocity(len(bodies) - 1)[0][0]
         engine.run(0.5)
-        errors.append(abs((engine.velocity(body)[0][0] - before) / 0.5 - acceleration) / G)
+        errors.append(abs((engine.velocity(len(bodies) - 1)[0][0] - before) / 0.5 - expected) / G)
     return max(errors)
 
 
-def on_slopes(start: Start, bodies: list[Body], material: Material, friction: float) -> tuple[float, Engine]:
-    """A body on slopes 1 % below and 1 % above its friction: it stays, or slides as the textbook says."""
-    engines, expected = [], []
-    for share in (0.99, 1.01):
-        angle = math.atan(share * friction)
-        engines.append(start(bodies, material, slope(angle)))
-        expected.append(max(0.0, G * (math.sin(angle) - friction * math.cos(angle))))
-    error = threshold(engines, expected, len(bodies) - 1)
-    first, second = engines
-    first.cost, first.seconds = first.cost + second.cost, first.seconds + second.seconds
-    second.__exit__()
-    return error, first
-
-
-def incline(start: Start) -> tuple[float, Engine]:
+def incline(start: Start) -> float:
     """The acceleration of a box on slopes of 0.99 and 1.01 of its friction, over g."""
     material = Material()
     box = Body("box", (HALF, HALF, HALF), (0, 0, sunk(HALF, material)))
     return on_slopes(start, [box], material, material.friction)
 
 
-def groove(start: Start) -> tuple[float, Engine]:
+def groove(start: Start) -> float:
     """The same in a groove between two walls at 45 degrees, where the friction is √2 times as large."""
     half, thick = math.sqrt(0.5), 0.2
-    turned = (math.sin(math.pi / 8), 0.0, 0.0, math.cos(math.pi / 8))
-    walls = [Body("box", (1, thick, thick), (0, side * half * thick, 1 - half * thick), turned, 0) for side in (1, -1)]
-    cube = Body("box", (HALF,) * 3, (0, 0, 1 + HALF * math.sqrt(2)), turned)
+    turn = POSES["edge"]
+    walls = [Body("box", (1, thick, thick), (0, side * half * thick, 1 - half * thick), turn, 0) for side in (1, -1)]
+    cube = Body("box", (HALF,) * 3, (0, 0, 1 + HALF * math.sqrt(2)), turn)
     material = Material()
     return on_slopes(start, [*walls, cube], material, math.sqrt(2) * material.friction)
 
 
-def at_rest(engine: Engine, seconds: float) -> tuple[float, Engine]:
+def at_rest(engine: Engine, seconds: float) -> float:
     """The largest way of a body in the second half of the time, m."""
     engine.run(seconds / 2)
     before = engine.positions()
     engine.run(seconds / 2)
-    return float(np.linalg.norm(engine.positions() - before, axis=1).max()), engine
+    return float(np.linalg.norm(engine.positions() - before, axis=1).max())
 
 
-def sinks(engine: Engine, body: int, settling: float) -> tuple[float, Engine]:
+def sinks(engine: Engine, body: int, settling: float) -> float:
     """How far a body sinks in 1.25 s, after so many seconds to settle, m."""
     engine.run(settling)
     height = engine.position(body)[2]
     engine.run(1.25)
-    return abs(height - engine.position(body)[2]), engine
+    return abs(height - engine.position(body)[2])
 
 
-def stack(count: int) -> Callable[[Start], tuple[float, Engine]]:
+def stack(count: int) -> Callable[[Start], float]:
     """The drift of cubes on each other, each second one set 2 mm aside, in the second half of two seconds, m."""
 
-    def of(start: Start) -> tuple[float, Engine]:
+    def of(start: Start) -> float:
         cubes = [Body("box", (HALF,) * 3, (0.002 * (k % 2), 0, HALF * (2 * k + 1))) for k in range(count)]
         return at_rest(start(cubes, Material(default=True)), 2)
 
     return of
 
 
-def pyramid(start: Start) -> tuple[float, Engine]:
+def pyramid(start: Start) -> float:
     """The drift of a wall of 21 bricks in six rows, in the second half of a second, m."""
     bricks = [
         Body("box", (0.1, HALF, HALF), (0.202 * (k - (5 - row) / 2), 0, HALF * (2 * row + 1)))
@@ -182,39 +175,31 @@ def pyramid(start: Start) -> tuple[float, Engine]:
     return at_rest(start(bricks, Material(default=True)), 1)
 
 
-def arch(thickness: float, settling: float = SETTLING) -> Callable[[Start], tuple[float, Engine]]:
+def arch(thickness: float, settling: float = SETTLING) -> Callable[[Start], float]:
     """How far the crown of a round arch of nine stones sinks, m. Heyman: it stands if t/R is above 0.1075."""
 
-    def of(start: Start) -> tuple[float, Engine]:
+    def of(start: Start) -> float:
         count, stones = 9, []
         for k in range(count):
             low, high = math.pi * k / count, math.pi * (k + 1) / count
             inner, outer = 1 - thickness / 2, 1 + thickness / 2
-            corners = np.array(
-                [
-                    (radius * math.cos(at), radius * math.sin(at))
-                    for radius, at in ((inner, low), (outer, low), (outer, high), (inner, high))
-                ]
-            )
-            centre, area = centroid(corners)
-            hull = [(x, y, z) for x, z in corners - centre for y in (-0.15, 0.15)]
-            stones.append(Body("hull", hull, (centre[0], 0, centre[1]), mass=area * 0.3 * 100))
+            corners = [
+                (radius * math.cos(at), radius * math.sin(at))
+                for radius, at in ((inner, low), (outer, low), (outer, high), (inner, high))
+            ]
+            section = Polygon(corners)
+            centre = section.centroid
+            hull = [(x - centre.x, y, z - centre.y) for x, z in corners for y in (-0.15, 0.15)]
+            stones.append(Body("hull", hull, (centre.x, 0, centre.y), mass=section.area * 0.3 * 100))
         return sinks(start(stones, Material(friction=0.7, default=True)), count // 2, settling)
 
     return of
 
 
-def centroid(polygon: np.ndarray) -> tuple[np.ndarray, float]:
-    """The centroid and the area of a polygon (n, 2)."""
-    after = np.roll(polygon, -1, axis=0)
-    cross = polygon[:, 0] * after[:, 1] - after[:, 0] * polygon[:, 1]
-    return ((polygon + after) * cross[:, None]).sum(axis=0) / (3 * cross.sum()), abs(cross.sum()) / 2
-
-
-def cards(share: float, settling: float = SETTLING) -> Callable[[Start], tuple[float, Engine]]:
+def cards(share: float, settling: float = SETTLING) -> Callable[[Start], float]:
     """How far two cards sink that lean on each other, m. They stand if half the tangent of the lean is below µ."""
 
-    def of(start: Start) -> tuple[float, Engine]:
+    def of(start: Start) -> float:
         friction, length, thin = 0.4, 0.1, 0.002
         lean = math.atan(2 * friction * share)
         leaning = []
@@ -223,14 +208,14 @@ def cards(share: float, settling: float = SETTLING) -> Callable[[Start], tuple[f
             c, s = math.cos(turn), math.sin(turn)
             inner = min((x * c + length * s for x in (-thin, thin)), key=lambda x: side * x)
             low = min(-x * s - length * c for x in (-thin, thin))
-            pose = (0.0, math.sin(turn / 2), 0.0, math.cos(turn / 2))
+            pose = p.getQuaternionFromEuler([0, turn, 0])
             leaning.append(Body("box", (thin, 0.05, length), (-inner, 0, -low), pose, 0.1))
         return sinks(start(leaning, Material(friction=friction, default=True)), 0, settling)
 
     return of
 
 
-def cradle(start: Start) -> tuple[float, Engine]:
+def cradle(start: Start) -> float:
     """Five elastic balls in a row, 1 mm apart. The first comes with 1 m/s. The largest error of a speed, m/s."""
     gap = 1e-3
     balls = [
@@ -239,10 +224,10 @@ def cradle(start: Start) -> tuple[float, Engine]:
     ]
     engine = start(balls, Material(friction=0, elastic=True, stiffness=1e7), (0, 0, 0))
     engine.run(0.25)
-    return max(abs(engine.velocity(k)[0][0] - (k == 4)) for k in range(5)), engine
+    return max(abs(engine.velocity(k)[0][0] - (k == 4)) for k in range(5))
 
 
-def turntable(start: Start) -> tuple[float, Engine]:
+def turntable(start: Start) -> float:
     """The drift outwards of a cube on a heavy table that turns at 3 rad/s, in the last of two seconds, m/s."""
     turn, radius, material = 3.0, 0.3, Material()
     table = Body("box", (0.6, 0.6, HALF), (0, 0, 1), mass=1e6, spin=(0, 0, turn), hinge=True)
@@ -252,12 +237,12 @@ def turntable(start: Start) -> tuple[float, Engine]:
     engine.run(1)
     before = np.linalg.norm(engine.position(1)[:2])
     engine.run(1)
-    return abs(float(np.linalg.norm(engine.position(1)[:2]) - before)), engine
+    return abs(float(np.linalg.norm(engine.position(1)[:2]) - before))
 
 
 class Experiment(NamedTuple):
     title: str  # with the unit of the error
-    make: Callable[[Start], tuple[float, Engine]]
+    make: Callable[[Start], float]
 
 
 EXPERIMENTS = {
@@ -287,17 +272,19 @@ def installed() -> dict[str, type[Engine]]:
     return {name: kind for name, kind in ENGINES.items() if name != "Drake" or find_spec("pydrake")}
 
 
-def run(name: str, kind: type[Engine], substeps: int) -> tuple[float, Engine]:
-    """The error, and the engine at the end, with its time."""
+def run(name: str, kind: type[Engine], substeps: int) -> tuple[float, float, float]:
+    """The error, the milliseconds of a simulated second, and the seconds of the processor."""
+    started = []
 
     def start(bodies: list[Body], material: Material, gravity: Sequence[float] = (0, 0, -G)) -> Engine:
-        return kind(bodies, material, substeps, gravity)
+        started.append(kind(bodies, material, substeps, gravity))
+        return stack.enter_context(started[-1])
 
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), ExitStack() as stack:
         warnings.simplefilter("ignore", SubstepsWarning)  # few are taken to see what is lost
-        error, engine = ALL[name].make(start)
-        engine.__exit__()
-    return error, engine
+        error = ALL[name].make(start)
+    cost = sum(engine.cost for engine in started)
+    return error, 1e3 * cost / sum(engine.seconds for engine in started), cost
 
 
 def options(parser: ArgumentParser) -> None:
@@ -325,11 +312,11 @@ def measured(name: str) -> Iterator[tuple]:
     for engine, kind in installed().items():
         for substeps in SUBSTEPS if name in EXPERIMENTS else SUBSTEPS[1:2]:
             try:
-                error, done = run(name, kind, substeps)
+                error, ms, cost = run(name, kind, substeps)
             except RuntimeError as failure:  # Drake's solver did not converge
                 print(f"{name}, {engine}, {substeps} substeps: {failure}".split(". ")[0], flush=True)
                 yield name, engine, substeps, "nan", "nan"
                 continue
-            yield name, engine, substeps, f"{error:.3g}", f"{done.ms_per_second:.4g}"
-            if done.cost > LONGEST:
+            yield name, engine, substeps, f"{error:.3g}", f"{ms:.4g}"
+            if cost > LONGEST:
                 break

@@ -21,7 +21,7 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 class Body(NamedTuple):
-    """A uniform body. A mass of 0 fixes it. With a hinge, it only turns about the vertical axis."""
+    """A uniform body. A mass of 0 fixes it. A box with a hinge only turns about the vertical axis."""
 
     kind: str  # "box", "ball" or "hull"
     size: Any  # m: half sizes of a box, radius of a ball, vertices (n, 3) of a hull about its centroid
@@ -76,10 +76,6 @@ class Engine(ABC):
         self.seconds += steps * STEP
 
     @property
-    def ms_per_second(self) -> float:
-        return 1e3 * self.cost / self.seconds
-
-    @property
     def lag(self) -> np.ndarray:
         """What all these engines add to a velocity in free flight by half a substep: they move by the new velocity."""
         return self.gravity * STEP / self.substeps / 2
@@ -99,10 +95,6 @@ class Engine(ABC):
 
     def positions(self) -> np.ndarray:
         return np.array([self.position(k) for k, each in enumerate(self.bodies) if each.mass])
-
-    def speed(self) -> float:
-        """Of the fastest body."""
-        return max(float(np.linalg.norm(self.velocity(k)[0])) for k, each in enumerate(self.bodies) if each.mass)
 
 
 class Bullet(Engine):
@@ -124,27 +116,19 @@ class Bullet(Engine):
         self.world.__exit__()
 
     def add(self, body: Body) -> None:
-        client = self.world.client
         kind, figures = {
             "box": (p.GEOM_BOX, {"halfExtents": body.size}),
             "ball": (p.GEOM_SPHERE, {"radius": body.size}),
             "hull": (p.GEOM_MESH, {"vertices": np.asarray(body.size).tolist()}),
         }[body.kind]
-        if not body.hinge:
+        if body.hinge:
+            id = self.world.turntable(body.size, body.position, body.mass)
+            p.setJointMotorControl2(id, 0, p.VELOCITY_CONTROL, force=0, physicsClientId=self.world.client)
+            p.resetJointState(id, 0, 0, body.spin[2], physicsClientId=self.world.client)
+        else:
             id = self.world.body(body.mass, kind, body.position, body.orientation, **figures)
             if body.mass:
                 self.world.push(id, body.velocity, body.spin)
-        else:
-            id = p.createMultiBody(
-                0, basePosition=body.position, linkMasses=[body.mass],
-                linkCollisionShapeIndices=[p.createCollisionShape(kind, physicsClientId=client, **figures)],
-                linkVisualShapeIndices=[-1], linkPositions=[(0, 0, 0)], linkOrientations=[UPRIGHT],
-                linkInertialFramePositions=[(0, 0, 0)], linkInertialFrameOrientations=[UPRIGHT],
-                linkParentIndices=[0], linkJointTypes=[p.JOINT_REVOLUTE], linkJointAxis=[(0, 0, 1)],
-                physicsClientId=client,
-            )  # fmt: skip
-            p.setJointMotorControl2(id, 0, p.VELOCITY_CONTROL, force=0, physicsClientId=client)
-            p.resetJointState(id, 0, 0, body.spin[2], physicsClientId=client)
         self.ids.append(id)
 
     def step(self) -> None:

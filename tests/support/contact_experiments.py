@@ -57,6 +57,26 @@ class World:
     def box(self, *half: float, mass=1.0, **where: Any) -> int:
         return self.body(mass, p.GEOM_BOX, halfExtents=half, **where)
 
+    def turntable(self, half, position, mass: float) -> int:
+        """A box that turns about the vertical axis alone: link 0, after a base without a shape."""
+        return p.createMultiBody(
+            0,
+            basePosition=position,
+            linkMasses=[mass],
+            linkCollisionShapeIndices=[
+                p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
+            ],
+            linkVisualShapeIndices=[-1],
+            linkPositions=[[0, 0, 0]],
+            linkOrientations=[[0, 0, 0, 1]],
+            linkInertialFramePositions=[[0, 0, 0]],
+            linkInertialFrameOrientations=[[0, 0, 0, 1]],
+            linkParentIndices=[0],
+            linkJointTypes=[p.JOINT_REVOLUTE],
+            linkJointAxis=[[0, 0, 1]],
+            physicsClientId=self.client,
+        )
+
     def undamped(self, id: int, friction: float, **more: float) -> None:
         for link in range(-1, p.getNumJoints(id, self.client)):
             p.changeDynamics(
@@ -444,22 +464,7 @@ def turntable(turn: float, law="volumetric", substeps: Any = 1, radius=0.3, seco
     """The drift outwards in m/s of a cube on a disc that turns, in the last second, and its slip (0 for Bullet)."""
     with World() as world:
         client = world.client
-        disc = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.6, 0.6, 0.05], physicsClientId=client)
-        table = p.createMultiBody(
-            0,
-            basePosition=[0, 0, 1],
-            linkMasses=[50],
-            linkCollisionShapeIndices=[disc],
-            linkVisualShapeIndices=[-1],
-            linkPositions=[[0, 0, 0]],
-            linkOrientations=[[0, 0, 0, 1]],
-            linkInertialFramePositions=[[0, 0, 0]],
-            linkInertialFrameOrientations=[[0, 0, 0, 1]],
-            linkParentIndices=[0],
-            linkJointTypes=[p.JOINT_REVOLUTE],
-            linkJointAxis=[[0, 0, 1]],
-            physicsClientId=client,
-        )
+        table = world.turntable([0.6, 0.6, 0.05], position=[0, 0, 1], mass=50)
         world.undamped(table, 1)
         cube = world.box(0.03, 0.03, 0.03, position=[radius, 0, 1.08 - G / (1e7 * 0.06**2)], friction=1)
         p.resetJointState(table, 0, 0, turn, physicsClientId=client)
