@@ -27,7 +27,14 @@ collect_ignore = [] if importlib.util.find_spec("torch") else ["with_torch"]
 
 
 def pytest_addoption(parser):
-    parser.addoption("--every", type=int, default=1, help="run only each N-th case of a parametrized test")
+    parser.addoption("--every", type=positive, default=1, help="run only each N-th case of a parametrized test")
+
+
+def positive(text):
+    """The number. argparse reports a number below 1."""
+    if int(text) < 1:
+        raise ValueError(text)
+    return int(text)
 
 
 def pytest_collection_modifyitems(config, items):

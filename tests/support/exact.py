@@ -206,6 +206,21 @@ def moment_of(facet: Facet, about: Vector) -> Vector:
 # The hull of points
 
 
+def barycentric(ring: Ring, k: int, at: Vector) -> Fraction:
+    """The coordinate of a point in the plane of a triangle: 1 at corner k, 0 at the other corners."""
+    a, b, c = (coordinates(ring[(k + i) % 3]) for i in range(3))
+    normal = cross(subtract(b, a), subtract(c, a))
+    return dot(cross(subtract(c, b), subtract(at, b)), normal) / dot(normal, normal)
+
+
+def triangles_of(whole: Polytope, part: Polytope, owner: int) -> Iterator[tuple[Ring, list[Vector]]]:
+    """The corners of each triangle of `whole`, and those of the facet of `part` in it, if the owner has it alone."""
+    ring_of = {facet.plane: facet.ring for facet in whole.facets}
+    for facet in part.facets:
+        if facet.owners == (owner,):
+            yield ring_of[facet.plane], [coordinates(p) for p in facet.ring]
+
+
 def hull(points: Iterable[Iterable[float | Fraction]]) -> Polytope:
     """The convex hull of points that are not all in one plane, grown by one point at a time."""
     cloud = list(dict.fromkeys(point(p) for p in points))

@@ -50,23 +50,11 @@ def by_vertices(case, body):
     λ is linear. The integral over a triangle is area / 12 times the sum of x λ at the corners and of their sums.
     """
     found = {p: np.zeros((3, 3)) for p in case.solids[body].vertices}
-    corners_of = {facet.plane: facet.ring for facet in case.solids[body].facets}
     centroid = case.truth.centroid
-    for facet in case.truth.facets:
-        if facet.owners != (body,):
-            continue
-        ring = corners_of[facet.plane]
-        corners = [exact.coordinates(p) for p in ring]
-        normal = tuple(map(Fraction, facet.plane[:3]))
-        height = exact.dot(exact.cross(*(exact.subtract(c, corners[0]) for c in corners[1:])), normal)
-        part = [exact.coordinates(p) for p in facet.ring]
+    for ring, part in exact.triangles_of(case.solids[body], case.truth, body):
+        places = [whole(exact.subtract(p, centroid)) for p in part]
         for k in range(3):
-            side = exact.subtract(corners[k - 1], corners[k - 2])
-            share = [
-                round(exact.dot(exact.cross(side, exact.subtract(p, corners[k - 2])), normal) / height * 2**FINE)
-                for p in part
-            ]
-            places = [whole(exact.subtract(p, centroid)) for p in part]
+            share = [round(exact.barycentric(ring, k, p) * 2**FINE) for p in part]
             for i, j in pairwise(range(1, len(part))):
                 p, q, r = places[0], places[i], places[j]
                 total = exact.add(exact.add(p, q), r)

@@ -33,22 +33,13 @@ def by_vertices(case, body):
     Over a triangle of the common surface, the mean of a barycentric coordinate is its value at the centroid.
     """
     found = {point: exact.vector((0, 0, 0)) for point in case.solids[body].vertices}
-    corners_of = {facet.plane: facet.ring for facet in case.solids[body].facets}
-    for facet in case.truth.facets:
-        if facet.owners != (body,):
-            continue
-        ring = corners_of[facet.plane]
-        corners = [exact.coordinates(p) for p in ring]
-        normal = tuple(map(Fraction, facet.plane[:3]))
-        whole = exact.dot(exact.cross(*(exact.subtract(c, corners[0]) for c in corners[1:])), normal)
-        part = [exact.coordinates(p) for p in facet.ring]
+    for ring, part in exact.triangles_of(case.solids[body], case.truth, body):
         for q, r in pairwise(part[1:]):
             area = exact.cross(exact.subtract(q, part[0]), exact.subtract(r, part[0]))
             middle = tuple((x + y + z) / 3 for x, y, z in zip(part[0], q, r))
             for k in range(3):
-                side = exact.subtract(corners[k - 1], corners[k - 2])
-                share = exact.dot(exact.cross(side, exact.subtract(middle, corners[k - 2])), normal) / whole
-                found[ring[k]] = exact.add(found[ring[k]], tuple(share * each / 2 for each in area))
+                share = tuple(exact.barycentric(ring, k, middle) * each / 2 for each in area)
+                found[ring[k]] = exact.add(found[ring[k]], share)
     return found
 
 
