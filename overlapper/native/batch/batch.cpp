@@ -49,9 +49,10 @@ Overlaps::Row row_of(Overlap overlap) {
   return row;
 }
 
-Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method method) {
+/// `patch` gets the patch of a pair that clipping has measured, unless it is null.
+Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method method, std::optional<Patch>* patch) {
   if (method == Method::kAuto) {
-    std::optional<Measures> at_once = measure_at_once(a, b);
+    std::optional<Measures> at_once = measure_at_once(a, b, nullptr, patch);
     if (at_once && at_once->status == Status::kSeparated) return {};
     if (at_once && at_once->measured) {
       const Penetration way = penetration_in_order(a, b);
@@ -237,7 +238,9 @@ const std::vector<PoseHessian>& Overlaps::hessians() const {
 
 /// Equals Overlap::patch(), without an Overlap where the way is the same.
 Patch Overlaps::patch(size_t row, const std::optional<Vec3>& direction) const {
+  if (patches_asked) patches_asked->store(true, std::memory_order_relaxed);
   if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) return PatchSums({}, {}).patch();
+  if (!direction && row < clipped.size() && clipped[row]) return *clipped[row];
   const auto [a, b] = pairs[row];
   const Way by = static_cast<Way>(way[row]);
   std::optional<Patch> exact;
@@ -264,6 +267,8 @@ Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
   };
   std::apply([&](const auto&... column) { (pick(this->*column.values, chosen.*column.values), ...); }, kColumns);
   pick(source, chosen.source);
+  if (!clipped.empty()) pick(clipped, chosen.clipped);
+  chosen.patches_asked = patches_asked;
   return chosen;
 }
 
@@ -279,6 +284,8 @@ struct Batch::Memory {
   std::vector<IndexPair> candidates;
   std::vector<Known> known, next_known;        ///< of the last call with pairs, and of the present one
   std::vector<Overlaps::Row> rows, next_rows;  ///< parallel to `known` and `next_known`
+  std::vector<std::optional<Patch>> patches, next_patches;  ///< likewise if they were asked for, else empty
+  bool with_patches = false;
   std::vector<char> done;                      ///< per pair of the present call
   std::atomic<size_t> asked{0};                ///< planes, in the present call
   bool sorted = false;                         ///< true if `known` is sorted by pair
@@ -334,7 +341,7 @@ void Batch::Memory::begin(std::span<const IndexPair> pairs) {
   both_sorted = sorted && std::is_sorted(pairs.begin(), pairs.end());
   walked = 0;
   asked = 0;
-  next_known.clear(), next_rows.clear(), before.clear(), done.clear();
+  next_known.clear(), next_rows.clear(), next_patches.clear(), before.clear(), done.clear();
   next_known.reserve(pairs.size()), next_rows.reserve(pairs.size());
   before.reserve(pairs.size()), done.reserve(pairs.size());
 }
@@ -349,6 +356,7 @@ void Batch::Memory::recall(std::span<const IndexPair> pairs) {
     next_known.push_back({pair, {bodies[pair[0]].version, bodies[pair[1]].version}, {}});
   }
   next_rows.resize(next_known.size());
+  if (with_patches) next_patches.resize(next_known.size());
   done.resize(next_known.size());
 }
 
@@ -358,8 +366,10 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   if (before[i] >= 0) {
     const Known& last = known[before[i]];
     pair.axis = last.axis;
-    if (last.version == pair.version && tolerance == with_tolerance && method == by_method) {
+    const bool patch_known = !with_patches || !patches.empty();
+    if (last.version == pair.version && tolerance == with_tolerance && method == by_method && patch_known) {
       next_rows[i] = rows[before[i]];
+      if (with_patches) next_patches[i] = patches[before[i]];
       done[i] = true;
       return true;
     }
@@ -369,7 +379,7 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].measures.status == Status::kOverlapping;
   const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
   const size_t planes_before = planes_asked;
-  next_rows[i] = separated ? Overlaps::Row{} : row_of(a.placed, b.placed, with_tolerance, by_method);
+  next_rows[i] = separated ? Overlaps::Row{} : row_of(a.placed, b.placed, with_tolerance, by_method, with_patches ? &next_patches[i] : nullptr);
   next_rows[i].pair = pair.pair;
   asked.fetch_add(planes_asked - planes_before, std::memory_order_relaxed);
   done[i] = true;
@@ -379,6 +389,7 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
 void Batch::Memory::keep(double of_tolerance, Method of_method) {
   known.swap(next_known);
   rows.swap(next_rows);
+  patches.swap(next_patches);
   tolerance = of_tolerance;
   method = of_method;
   sorted = std::is_sorted(known.begin(), known.end(), [](const Known& a, const Known& b) { return a.pair < b.pair; });
@@ -437,6 +448,8 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   answer.method = method;
   answer.shapes = shapes_;
   answer.poses = memory->poses;
+  answer.patches_asked = patches_asked_;
+  memory->with_patches = patches_asked_->load(std::memory_order_relaxed);
   const auto listed = [&](size_t i) {
     return memory->done[i] && (separated || memory->next_rows[i].measures.status != Status::kSeparated);
   };
@@ -450,7 +463,10 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
     for (size_t i = first; i < first + count; ++i) answer.examined += memory->done[i], rows += listed(i);
     if (first == 0) answer.reserve(separated ? pairs.size() : rows);
     for (size_t i = first; i < first + count; ++i)
-      if (listed(i)) answer.append(memory->next_rows[i]);
+      if (listed(i)) {
+        answer.append(memory->next_rows[i]);
+        if (memory->with_patches) answer.clipped.push_back(memory->next_patches[i]);
+      }
   }
   answer.planes_asked = memory->asked;
   if (finished) memory->keep(tolerance, method);

@@ -63,6 +63,10 @@ struct Overlaps {
   /// The Overlap of a row, while the batch keeps it; empty if it is cheap to make again.
   std::vector<std::weak_ptr<Overlap>> source;
 
+  /// The patches of the rows that clipping has measured. Empty unless patches were asked of earlier results of the batch.
+  std::vector<std::optional<Patch>> clipped;
+  std::shared_ptr<std::atomic<bool>> patches_asked;  ///< of any results of the batch; null without a batch
+
   size_t examined = 0;      ///< pairs examined, with or without a row
   size_t planes_asked = 0;  ///< number of planes of their shapes that were evaluated, without pairs that have not moved
   double tolerance = 0;
@@ -185,6 +189,7 @@ class Batch {
 
   std::shared_ptr<const std::vector<Shape>> shapes_;
   std::unique_ptr<Memory> memory_;
+  std::shared_ptr<std::atomic<bool>> patches_asked_ = std::make_shared<std::atomic<bool>>(false);
   std::atomic_flag in_use_;
 };
 

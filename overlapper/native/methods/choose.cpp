@@ -74,11 +74,12 @@ Traits traits(std::span<const Placed> bodies) {
 
 const Choice& choose(const Traits& traits) { return first_that_fits<0>(traits); }
 
-std::optional<Measures> measure_at_once(const Placed& a, const Placed& b, std::optional<SideAreas>* sides) {
+std::optional<Measures> measure_at_once(const Placed& a, const Placed& b, std::optional<SideAreas>* sides,
+                                        std::optional<Patch>* patch) {
   const Choice& choice = choose(traits(a, b));
   if (choice.tries(Way::kTracing))
     if (auto measures = trace(a, b)) return measures;
-  return choice.tries(Way::kClipping) ? clip(a, b, sides) : std::nullopt;
+  return choice.tries(Way::kClipping) ? clip(a, b, sides, patch) : std::nullopt;
 }
 
 std::optional<Measures> measure_at_once(std::span<const Placed> bodies) {

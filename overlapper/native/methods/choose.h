@@ -77,8 +77,9 @@ const Choice& choose(const Traits& traits);
 
 /// The answer of the ways before the search: a certain status, and measures if the error of the volume is within
 /// kEnough of the volume. Corners may be placed in double-double. No value if signs are uncertain, or for round bodies.
-/// `sides` gets areas if clipping has measured the pair; see clip().
-std::optional<Measures> measure_at_once(const Placed& a, const Placed& b, std::optional<SideAreas>* sides = nullptr);
+/// `sides` gets areas and `patch` the patch if clipping has measured the pair; see clip().
+std::optional<Measures> measure_at_once(const Placed& a, const Placed& b, std::optional<SideAreas>* sides = nullptr,
+                                        std::optional<Patch>* patch = nullptr);
 std::optional<Measures> measure_at_once(std::span<const Placed> bodies);
 
 /// The bodies in canonical order, relative to a reference near them. The bits of an answer then do not depend on the

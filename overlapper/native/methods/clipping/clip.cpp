@@ -356,13 +356,19 @@ void add_pulls(const Workspace& w, const Pose& pose, Vec3 centroid, std::vector<
 
 }  // namespace
 
-std::optional<Measures> clip(const Placed& a, const Placed& b, std::optional<SideAreas>* sides) {
-  const bool swapped = !comes_first(a, b);
+std::optional<Measures> clip(const Placed& a, const Placed& b, std::optional<SideAreas>* sides,
+                             std::optional<Patch>* patch) {
+  WantedPatch wanted{!comes_first(a, b), {}};
+  const bool swapped = wanted.swapped;
+  const Placed &first = swapped ? b : a, &second = swapped ? a : b;
   std::optional<Measures> common(std::in_place);
   Pull on_first{};
-  if (swapped ? clip_in_first(b, a, *common, on_first) : clip_in_first(a, b, *common, on_first))
+  if (clip_in_first(first, second, *common, on_first, patch ? &wanted : nullptr)) {
     say_in_world(*common, on_first, a, b, swapped);
-  else common.reset();
+    if (patch && common->measured) *patch = turned(wanted.patch, first.pose.rotation, first.pose.translation);
+  } else {
+    common.reset();
+  }
   if (sides && common && common->measured) {
     *sides = side_areas(workspace(), swapped ? b : a, swapped ? a : b);
     if (swapped) std::swap((**sides)[0], (**sides)[1]);

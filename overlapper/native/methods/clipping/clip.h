@@ -24,8 +24,9 @@ using SideAreas = std::array<Vec3, 2>;
 /// pair of facets that cross. That segment joins the two points that lie on both facets. Volume, moments and area
 /// vectors are sums over edges, in any order.
 ///
-/// If the answer is measured, `sides` gets its areas unless it is null.
-std::optional<Measures> clip(const Placed& a, const Placed& b, std::optional<SideAreas>* sides = nullptr);
+/// If the answer is measured, `sides` gets its areas and `patch` gets clipped_patch() unless they are null.
+std::optional<Measures> clip(const Placed& a, const Placed& b, std::optional<SideAreas>* sides = nullptr,
+                             std::optional<Patch>* patch = nullptr);
 
 /// The patch of a pair that clip() has measured, in world coordinates. For other pairs there may be no value. The patch
 /// is seen along `direction` if it is given.
