@@ -26,8 +26,8 @@ BISECTIONS = 8
 class Coming(NamedTuple):
     """The contacts that come within a step."""
 
-    meets: bool = False
-    """Whether a pair that does not overlap yet overlaps at the end of the step."""
+    substeps: int = 1
+    """How many substeps the pairs need that do not overlap yet and overlap at the end of the step."""
     highest: float = 0.0
     """The square of the highest frequency (rad/s) of all overlaps. 0 if nobody asked for it."""
     swallowed: float = 0.0
@@ -49,7 +49,8 @@ def coming(
     their `velocity`.
 
     If a body came in with a long step, it would be deeper than its speed can carry it, and it would be thrown back.
-    Steps are therefore short before they have to be: before two bodies touch, and before an edge comes down to a face.
+    Steps are therefore short before they have to be: before two bodies touch at speed, and before an edge comes down to
+    a face.
     """
     # Bodies at rest bring no new contact.
     if np.abs(velocity).max(initial=0.0) * duration < STILL:
@@ -57,7 +58,8 @@ def coming(
     if not frequencies and not masses.moves_far(duration, velocity):
         return Coming()
     solver = masses.dynamics.solver.copy() if frequencies else None
-    meets, highest = False, 0.0
+    substeps, highest = 1, 0.0
+    overlapping = _codes(now.pairs[now.volume > 0])
     known: set[tuple[int, int]] | None = None
     # A small and fast body is swallowed within the step: then it counts when it was half in, and for how long.
     lost: set[tuple[int, int]] = set()
@@ -66,7 +68,8 @@ def coming(
         found = masses.ahead(part * duration, velocity, among)
         if solver:
             highest = max(highest, float(masses.place(solver, frames, found)[0].max(initial=0.0)))
-        meets = meets or not np.isin(_codes(found), _codes(now)).all()
+        new = np.flatnonzero((found.volume > 0) & ~np.isin(_codes(found.pairs), overlapping))
+        substeps = max(substeps, masses.depth_substeps(found.pairs[new], found.depth[new]))
         swallowed = _swallowed(found)
         if swallowed:
             known = _swallowed(now) if known is None else known
@@ -78,7 +81,7 @@ def coming(
         else:
             break
         part = (early + late) / 2
-    return Coming(meets, highest, (2 / (late - early) / duration) ** 2 if lost else 0.0)
+    return Coming(substeps, highest, (2 / (late - early) / duration) ** 2 if lost else 0.0)
 
 
 def followed(frequency2: float, duration: float) -> int:
@@ -92,7 +95,7 @@ def _swallowed(found: Overlaps) -> set[tuple[int, int]]:
     return {(a, b) for a, b in found.pairs[rows].tolist()} if rows.any() else set()
 
 
-def _codes(found: Overlaps) -> NDArray[np.int64]:
-    """Return a number for the pair of each row that shares a volume."""
-    pairs = found.pairs[found.volume > 0].astype(np.int64)
-    return np.asarray(pairs[:, 0] << 32 | pairs[:, 1])
+def _codes(pairs: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Return a number for each pair."""
+    wide = pairs.astype(np.int64)
+    return np.asarray(wide[:, 0] << 32 | wide[:, 1])

@@ -26,7 +26,7 @@ COARSE = 2.0
 MOST_SUBSTEPS = 200
 
 # The most substeps if no dissipation is given, as nothing swings then.
-FEW_SUBSTEPS = 4
+FEW_SUBSTEPS = 2
 
 # A mean depth of more than this share of the smaller body is worth a warning.
 DEEP = 0.2
@@ -62,8 +62,8 @@ class VolumetricContact:
         spread over the patch, with the simulator's coefficients. This is more exact where bodies slip and spin at once.
     substeps : int or 'auto', default 'auto'
         Number of parts of a step of the simulator. 'auto': with a `dissipation`, it follows from the stiffness and the
-        masses, anew in every step. Without one, it follows from the motion. It is 1 for bodies that rest, 4 at most for
-        others, and more for small bodies that would pass through others.
+        masses, anew in every step. Without one, it follows from the motion. It is 1 for bodies that move little, 2
+        for others, and more for small bodies that would pass through others.
     restitution : float or callable, optional
         The speed after an impact over the speed before it. Slower impacts than 0.2 m/s have none. Default: that of the
         simulator. In pybullet it is the product of the two links' restitution, which is 0 unless it is set. In MuJoCo
@@ -482,9 +482,9 @@ class VolumetricContact:
         few = max(1, FEW_SUBSTEPS - taken)
         if planned >= few:
             return planned
-        if coming.meets:
-            return max(few, min(followed(coming.swallowed, left), most))
-        return self._masses.patch_substeps(self._contacts.overlaps, left, velocity, taken, few)
+        swallowed = followed(coming.swallowed, left)
+        wanted = max(coming.substeps, self._masses.patch_substeps(self._contacts.overlaps, left, velocity))
+        return max(min(wanted, few), min(swallowed, most))
 
     def _coming(self, duration: float, velocity: Array) -> Coming:
         """Return the overlaps that come within the duration. See `coming`."""

@@ -24,12 +24,10 @@ REMEMBERED = 8
 
 # In a substep, surfaces move over each other by at most this share of the smaller link's size. They turn by at most
 # this angle (rad).
-STEADY = 5e-3
+STEADY = 2e-2
 
-# No contact is lost in a step in which its surfaces move by less than this share of its depth. Other contacts have
-# at least so many substeps: a box that rests some nanometres deep may lose its contact, and would then fall for a whole
-# step.
-QUIET, LEAST = 0.1, 2
+# When two links meet, they are not deeper in each other than this share of the smaller link's size.
+SHALLOW = 5e-3
 
 
 class _Pairs(NamedTuple):
@@ -87,24 +85,25 @@ class Masses:
             areas[rows] = seen[:, None] * normals
         return areas
 
-    def patch_substeps(self, found: Overlaps, duration: float, velocity: Array, taken: int, most: int) -> int:
-        """Return the number of substeps of a duration (s) in which the patches of the placed overlaps move little.
-
-        `taken` substeps of the step are over. The number is `most` at most.
-        """
+    def patch_substeps(self, found: Overlaps, duration: float, velocity: Array) -> int:
+        """Return the number of substeps of a duration (s) in which the patches of the placed overlaps move little."""
         if not len(found):
             return 1
-        of, solver = self._of(found), self.dynamics.solver
-        travel, _ = solver.travel(duration, velocity)
-        share = np.maximum(travel[:, 0] / of.sizes, travel[:, 1]) / STEADY
-        least = 1 if (travel[:, 0] <= QUIET * solver.depths).all() else LEAST - taken
-        return min(max(1, least, math.ceil(float(share.max(initial=0.0)))), most)
+        travel, _ = self.dynamics.solver.travel(duration, velocity)
+        return _parts(np.maximum(travel[:, 0] / self.sizes_of(found), travel[:, 1]) / STEADY)
+
+    def depth_substeps(self, pairs: NDArray[np.int32], depths: Array) -> int:
+        """Return the number of substeps in which pairs (p, 2) of shapes that meet do not become too deep in each other.
+
+        `depths` (p,) in m are those at the end of the step, if nothing pushes the pairs apart.
+        """
+        return _parts(depths / self.sizes[self._links[pairs]].min(axis=1) / SHALLOW)
 
     def moves_far(self, duration: float, velocity: Array) -> bool:
-        """Whether a link moves by more than `STEADY` of the size of the smallest link within a duration (s)."""
+        """Whether a link may go deeper into another one than `SHALLOW` allows within a duration (s)."""
         _, travel = self.dynamics.solver.travel(duration, velocity)
         way = travel[:, 0] + self._extents * travel[:, 1]
-        return bool(way.max(initial=0.0) > STEADY * self._smallest)
+        return bool(way.max(initial=0.0) > SHALLOW * self._smallest)
 
     def place(self, solver: ContactSolver, frames: Sequence[Pose], found: Overlaps) -> tuple[Array, Array]:
         """Give a solver the overlaps of links that have these frames.
@@ -151,6 +150,11 @@ class Masses:
         )
         pairs = bodies.pairs_at(positions, orientations, among)
         return self._batch.overlaps(positions, orientations, pairs, separated=False)
+
+
+def _parts(shares: Array) -> int:
+    """Return the number of equal parts in which no share is above 1."""
+    return max(1, math.ceil(float(shares.max(initial=0.0))))
 
 
 def _sizes(shapes: Sequence[Shape], links: NDArray[np.int64], tops: Array | None, count: int) -> Array:
