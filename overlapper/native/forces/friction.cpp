@@ -9,27 +9,24 @@ namespace {
 /// Trace of a mobility times which its eigenvalues are regarded as zero.
 constexpr double kLeast = 1e-15;
 
-/// The Cholesky factor of a symmetric matrix with `shift` added along its diagonal.
+/// A symmetric matrix with `shift` added along its diagonal, as L D Lᵀ.
 struct Factor {
   Factor(const ThreeByThree& m, double shift) {
     const double least = kLeast * (m[0][0] + m[1][1] + m[2][2] + shift);
-    const auto root = [&](double square) { return 1 / std::sqrt(std::max(square, least)); };
-    a = root(m[0][0] + shift);
-    b = m[1][0] * a;
-    c = root(m[1][1] + shift - b * b);
-    d = m[2][0] * a;
-    e = (m[2][1] - d * b) * c;
-    f = root(m[2][2] + shift - d * d - e * e);
+    const auto inverted = [&](double pivot) { return 1 / std::max(pivot, least); };
+    first = inverted(m[0][0] + shift);
+    b = m[1][0] * first, d = m[2][0] * first;
+    second = inverted(m[1][1] + shift - b * m[1][0]);
+    const double left = m[2][1] - d * m[1][0];
+    e = left * second;
+    third = inverted(m[2][2] + shift - d * m[2][0] - e * left);
   }
-  Three lower(const Three& v) const {
-    const double x = v[0] * a, y = (v[1] - b * x) * c;
-    return {x, y, (v[2] - d * x - e * y) * f};
+  Three solve(const Three& v) const {
+    const double y = v[1] - b * v[0], z = (v[2] - d * v[0] - e * y) * third, up = y * second - e * z;
+    return {v[0] * first - b * up - d * z, up, z};
   }
-  Three upper(const Three& v) const {
-    const double z = v[2] * f, y = (v[1] - e * z) * c;
-    return {(v[0] - b * y - d * z) * a, y, z};
-  }
-  double a, b, c, d, e, f;  ///< by columns, the diagonal inverted
+  double b, d, e;               ///< below the diagonal of L, by columns
+  double first, second, third;  ///< the diagonal of D, inverted
 };
 
 /// The points of a patch are those of Gauss and Legendre in a rectangle that has the area moments of the patch.
@@ -51,22 +48,32 @@ static_assert(
 Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, double& shift) {
   if (!(limit > 0) || dot(slip, slip) == 0) return {};
   if (!(mobility[0][0] + mobility[1][1] + mobility[2][2] > 0)) return (-limit / std::sqrt(dot(slip, slip))) * slip;
-  // The force is -(mobility + shift)⁻¹ slip, and the remaining slip is -shift times the force. Newton's method on the
-  // inverse of the force's size finds the shift, if there is one (Moré and Sorensen 1983).
-  constexpr double kClose = 1e-12;
+  // The force is -(mobility + shift)⁻¹ slip, and the remaining slip is -shift times the force. Halley's method on the
+  // inverse of the force's size finds the shift, if there is one (Moré and Sorensen 1983). Its errors are cubic, so the
+  // force of the last step is found by its derivatives.
+  constexpr double kClose = 1e-4;
   Three force{};
   double size = 0;
   for (int step = 0; step < 50; ++step) {
     const Factor factor(mobility, shift);
-    force = factor.upper(factor.lower(slip));
+    force = factor.solve(slip);
     size = std::sqrt(dot(force, force));
-    if (std::abs(size - limit) <= kClose * limit || (shift == 0 && size <= limit)) break;
-    const Three half = factor.lower(force);
-    const double next = std::max(0.0, shift + size * size / dot(half, half) * (size - limit) / limit);
-    if (next == shift) break;
+    if (shift == 0 && size <= limit) return -1 * force;
+    const Three by_shift = factor.solve(force);  // and the opposite sign
+    const double off = (limit - size) / limit, slope = dot(force, by_shift) / size;
+    const double bend = 3 * (slope * slope - dot(by_shift, by_shift));
+    const double steep = std::max(2 * slope * slope - off * bend, slope * slope);  // far away, it is at most twice Newton's
+    const double next = std::max(0.0, shift - 2 * off * slope * size / steep);
+    const double moved = next - shift;
     shift = next;
+    if (moved == 0) break;
+    if (next > 0 && std::abs(off) <= kClose) {
+      force = force - moved * (by_shift - moved * factor.solve(by_shift));
+      size = std::sqrt(dot(force, force));
+      break;
+    }
   }
-  return (size > limit ? -limit / size : -1) * force;
+  return (-limit / std::max(size, limit)) * force;
 }
 
 Coulomb::Coulomb(const ThreeByThree& rows, const ThreeByThree& mobility, double share)
