@@ -66,17 +66,29 @@ def test_a_step_has_two_substeps_before_bodies_touch_and_one_where_they_rest():
         assert substeps[False, True][0] == 2 and substeps[False, True][-60:] == [1] * 60
 
 
-@pytest.mark.parametrize("speed", [1e-3, 0.5, 0.7, 3.0])
-def test_a_step_has_two_substeps_if_a_body_slides_by_more_than_a_fiftieth_of_its_size(speed):
-    size = 0.1 * (6 / np.pi) ** (1 / 3)  # of a ball of the cube's volume
+@pytest.mark.parametrize("share", [0.4, 0.6])
+def test_a_step_has_two_substeps_if_a_body_slides_by_more_than_half_of_its_depth(share):
     with World() as world:
         body = world.body(1.0, p.GEOM_BOX, [0, 0, 0.05 - 1e-6], halfExtents=[0.05] * 3)
-        with default(world, friction=0) as contact:
-            for _ in range(60):
+        with default(world, friction=0, stiffness=1e7) as contact:
+            for _ in range(120):
                 contact.step()
-            p.resetBaseVelocity(body, [speed, 0, 0], physicsClientId=world.client)
+            depth = G / 1e7 / 0.1**2
+            p.resetBaseVelocity(body, [share * depth * 240, 0, 0], physicsClientId=world.client)
             contact.step()
-        assert contact.substeps == (1 if speed / 240 < 2e-2 * size else 2)
+        assert contact.substeps == (1 if share < 0.5 else 2)
+
+
+@pytest.mark.parametrize("turn", [0.019, 0.021])
+def test_a_step_has_two_substeps_if_a_rolling_ball_turns_by_more_than_a_fiftieth(turn):
+    with World() as world:
+        body = ball(world, 0.05)
+        with default(world) as contact:
+            for _ in range(120):
+                contact.step()
+            p.resetBaseVelocity(body, [240 * turn * 0.05, 0, 0], [0, 240 * turn, 0], physicsClientId=world.client)
+            contact.step()
+        assert contact.substeps == (1 if turn < 0.02 else 2)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 0.9])

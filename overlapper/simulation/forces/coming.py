@@ -26,8 +26,8 @@ BISECTIONS = 8
 class Coming(NamedTuple):
     """The contacts that come within a step."""
 
-    substeps: int = 1
-    """How many substeps the pairs need that do not overlap yet and overlap at the end of the step."""
+    deep: bool = False
+    """Whether a pair that does not overlap yet would be too deep at the end of the step."""
     highest: float = 0.0
     """The square of the highest frequency (rad/s) of all overlaps. 0 if nobody asked for it."""
     swallowed: float = 0.0
@@ -58,7 +58,7 @@ def coming(
     if not frequencies and not masses.moves_far(duration, velocity):
         return Coming()
     solver = masses.dynamics.solver.copy() if frequencies else None
-    substeps, highest = 1, 0.0
+    deep, highest = False, 0.0
     overlapping = _codes(now.pairs[now.volume > 0])
     known: set[tuple[int, int]] | None = None
     # A small and fast body is swallowed within the step: then it counts when it was half in, and for how long.
@@ -69,7 +69,7 @@ def coming(
         if solver:
             highest = max(highest, float(masses.place(solver, frames, found)[0].max(initial=0.0)))
         new = np.flatnonzero((found.volume > 0) & ~np.isin(_codes(found.pairs), overlapping))
-        substeps = max(substeps, masses.depth_substeps(found.pairs[new], found.depth[new]))
+        deep = deep or masses.are_deep(found.pairs[new], found.depth[new])
         swallowed = _swallowed(found)
         if swallowed:
             known = _swallowed(now) if known is None else known
@@ -81,7 +81,7 @@ def coming(
         else:
             break
         part = (early + late) / 2
-    return Coming(substeps, highest, (2 / (late - early) / duration) ** 2 if lost else 0.0)
+    return Coming(deep, highest, (2 / (late - early) / duration) ** 2 if lost else 0.0)
 
 
 def followed(frequency2: float, duration: float) -> int:

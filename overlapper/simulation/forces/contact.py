@@ -482,9 +482,9 @@ class VolumetricContact:
         few = max(1, FEW_SUBSTEPS - taken)
         if planned >= few:
             return planned
-        swallowed = followed(coming.swallowed, left)
-        wanted = max(coming.substeps, self._masses.patch_substeps(self._contacts.overlaps, left, velocity))
-        return max(min(wanted, few), min(swallowed, most))
+        if coming.deep or not self._masses.are_steady(left, velocity):
+            return max(few, min(followed(coming.swallowed, left), most))
+        return 1
 
     def _coming(self, duration: float, velocity: Array) -> Coming:
         """Return the overlaps that come within the duration. See `coming`."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -22,9 +21,10 @@ from overlapper.simulation.model import Array
 # The largest number of lists of pairs whose laws are kept.
 REMEMBERED = 8
 
-# In a substep, surfaces move over each other by at most this share of the smaller link's size. They turn by at most
-# this angle (rad).
-STEADY = 2e-2
+# A patch is steady in a step in which its surfaces move over each other by less than this share of its depth, and turn by
+# less than this angle (rad). Otherwise a box that rests some nanometres deep may lose its contact, and would then fall
+# for a whole step.
+QUIET, STEADY = 0.5, 2e-2
 
 # When two links meet, they are not deeper in each other than this share of the smaller link's size.
 SHALLOW = 5e-3
@@ -85,19 +85,15 @@ class Masses:
             areas[rows] = seen[:, None] * normals
         return areas
 
-    def patch_substeps(self, found: Overlaps, duration: float, velocity: Array) -> int:
-        """Return the number of substeps of a duration (s) in which the patches of the placed overlaps move little."""
-        if not len(found):
-            return 1
-        travel, _ = self.dynamics.solver.travel(duration, velocity)
-        return _parts(np.maximum(travel[:, 0] / self.sizes_of(found), travel[:, 1]) / STEADY)
+    def are_steady(self, duration: float, velocity: Array) -> bool:
+        """Whether the placed patches move little within a duration (s)."""
+        solver = self.dynamics.solver
+        travel, _ = solver.travel(duration, velocity)
+        return bool((travel[:, 0] <= QUIET * solver.depths).all() and (travel[:, 1] <= STEADY).all())
 
-    def depth_substeps(self, pairs: NDArray[np.int32], depths: Array) -> int:
-        """Return the number of substeps in which pairs (p, 2) of shapes that meet do not become too deep in each other.
-
-        `depths` (p,) in m are those at the end of the step, if nothing pushes the pairs apart.
-        """
-        return _parts(depths / self.sizes[self._links[pairs]].min(axis=1) / SHALLOW)
+    def are_deep(self, pairs: NDArray[np.int32], depths: Array) -> bool:
+        """Whether one of the pairs (p, 2) of shapes is deeper than `SHALLOW` allows. Its depth in m is in `depths`."""
+        return bool((depths > SHALLOW * self.sizes[self._links[pairs]].min(axis=1)).any())
 
     def moves_far(self, duration: float, velocity: Array) -> bool:
         """Whether a link may go deeper into another one than `SHALLOW` allows within a duration (s)."""
@@ -150,11 +146,6 @@ class Masses:
         )
         pairs = bodies.pairs_at(positions, orientations, among)
         return self._batch.overlaps(positions, orientations, pairs, separated=False)
-
-
-def _parts(shares: Array) -> int:
-    """Return the number of equal parts in which no share is above 1."""
-    return max(1, math.ceil(float(shares.max(initial=0.0))))
 
 
 def _sizes(shapes: Sequence[Shape], links: NDArray[np.int64], tops: Array | None, count: int) -> Array:
