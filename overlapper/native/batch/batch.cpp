@@ -282,13 +282,13 @@ struct Batch::Memory {
   std::vector<std::uint64_t> enclosed;                    ///< parallel to `poses`: the versions of `enclosures`
   BoxTree tree;
   std::vector<IndexPair> candidates;
-  std::vector<Known> known, next_known;        ///< of the last call with pairs, and of the present one
-  std::vector<Overlaps::Row> rows, next_rows;  ///< parallel to `known` and `next_known`
+  std::vector<Known> known, next_known;                     ///< of the last call with pairs, and of the present one
+  std::vector<Overlaps::Row> rows, next_rows;               ///< parallel to `known` and `next_known`
   std::vector<std::optional<Patch>> patches, next_patches;  ///< likewise if they were asked for, else empty
   bool with_patches = false;
-  std::vector<char> done;                      ///< per pair of the present call
-  std::atomic<size_t> asked{0};                ///< planes, in the present call
-  bool sorted = false;                         ///< true if `known` is sorted by pair
+  std::vector<char> done;        ///< per pair of the present call
+  std::atomic<size_t> asked{0};  ///< planes, in the present call
+  bool sorted = false;           ///< true if `known` is sorted by pair
   double tolerance = 0;
   Method method = Method::kAuto;
 
@@ -379,7 +379,9 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].measures.status == Status::kOverlapping;
   const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
   const size_t planes_before = planes_asked;
-  next_rows[i] = separated ? Overlaps::Row{} : row_of(a.placed, b.placed, with_tolerance, by_method, with_patches ? &next_patches[i] : nullptr);
+  next_rows[i] = separated
+                     ? Overlaps::Row{}
+                     : row_of(a.placed, b.placed, with_tolerance, by_method, with_patches ? &next_patches[i] : nullptr);
   next_rows[i].pair = pair.pair;
   asked.fetch_add(planes_asked - planes_before, std::memory_order_relaxed);
   done[i] = true;

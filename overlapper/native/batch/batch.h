@@ -63,7 +63,8 @@ struct Overlaps {
   /// The Overlap of a row, while the batch keeps it; empty if it is cheap to make again.
   std::vector<std::weak_ptr<Overlap>> source;
 
-  /// The patches of the rows that clipping has measured. Empty unless patches were asked of earlier results of the batch.
+  /// The patches of the rows that clipping has measured. Empty unless patches were asked of earlier results of the
+  /// batch.
   std::vector<std::optional<Patch>> clipped;
   std::shared_ptr<std::atomic<bool>> patches_asked;  ///< of any results of the batch; null without a batch
 

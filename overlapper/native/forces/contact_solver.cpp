@@ -393,7 +393,9 @@ double ContactSolver::staying(const ElasticPatch& patch, Vec3 centre_velocity, V
 
 /// Without it, a body on a turntable leaves its circle along a tangent in every step. The body that turns less carries
 /// the other one around: what sticks to it moves along arcs. The other body may also turn relative to the first.
-ContactSolver::Drift ContactSolver::drift(size_t patch, const Step& step, std::span<const MovedOn> ahead) const {
+/// `rotations` are the rotation vectors of the links.
+ContactSolver::Drift ContactSolver::drift(size_t patch, const Step& step, std::span<const MovedOn> ahead,
+                                          std::span<const Vec3> rotations) const {
   const ElasticPatch& p = patches_[patch];
   const double h = step.duration;
   std::array<Vec3, 2> velocity, spin, bend, twist;
@@ -402,7 +404,7 @@ ContactSolver::Drift ContactSolver::drift(size_t patch, const Step& step, std::s
     const auto [linear, angular] = bodies_.twist(link[i], step.velocity);
     velocity[i] = linear, spin[i] = angular;
     bend[i] = (ahead[link[i]].centre - bodies_.centre(link[i])) / h - linear;
-    twist[i] = rotation_vector(ahead[link[i]].turn) / h - angular;
+    twist[i] = rotations[link[i]] / h - angular;
     if (!finite(twist[i])) return {};  // half a turn in a step has no direction
   }
   const int carrier = norm2(spin[0]) < norm2(spin[1]) ? 0 : 1, other = 1 - carrier;
@@ -951,12 +953,16 @@ ContactSolver::Solution ContactSolver::solve_patches(const Step& step, std::vect
   std::vector<MovedOn> found;
   if (step.ahead.empty() && patches > 0) found = bodies_.ahead(h, step.velocity);
   const std::span<const MovedOn> ahead = step.ahead.empty() ? std::span<const MovedOn>(found) : step.ahead;
+  std::vector<Vec3> rotations;
+  rotations.reserve(ahead.size());
+  for (const MovedOn& link : ahead) rotations.push_back(rotation_vector(link.turn));
   std::vector<Laws> laws;
   laws.reserve(count);
   std::vector<Six> before;
   std::vector<Drift> drifts;
+  before.reserve(patches), drifts.reserve(patches);
   for (size_t i = 0; i < patches; ++i) before.push_back(slip_of(rows_[i], step.velocity));
-  for (size_t i = 0; i < patches; ++i) drifts.push_back(drift(i, step, ahead));
+  for (size_t i = 0; i < patches; ++i) drifts.push_back(drift(i, step, ahead, rotations));
   for (size_t i = 0; i < patches; ++i) {
     const ElasticPatch& patch = patches_[i];
     const Row& row = rows_[i];

@@ -185,7 +185,7 @@ class ContactSolver {
   static Six six(const SixNumbers& of);
   Six known_wrench(size_t patch) const;
   double staying(const ElasticPatch& patch, Vec3 centre_velocity, Vec3 by_spin) const;
-  Drift drift(size_t patch, const Step& step, std::span<const MovedOn> ahead) const;
+  Drift drift(size_t patch, const Step& step, std::span<const MovedOn> ahead, std::span<const Vec3> rotations) const;
   Pressure::Damping damping(size_t patch, std::span<const Six> before, std::span<const Drift> drifts) const;
   std::vector<double> jacobian_of(int link, Vec3 point, double sign) const;
   Solution solve_with_motors(const Step& step, std::vector<double> velocity);

@@ -62,7 +62,8 @@ Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, do
     const Three by_shift = factor.solve(force);  // and the opposite sign
     const double off = (limit - size) / limit, slope = dot(force, by_shift) / size;
     const double bend = 3 * (slope * slope - dot(by_shift, by_shift));
-    const double steep = std::max(2 * slope * slope - off * bend, slope * slope);  // far away, it is at most twice Newton's
+    // Far away, the step is at most twice that of Newton's method.
+    const double steep = std::max(2 * slope * slope - off * bend, slope * slope);
     const double next = std::max(0.0, shift - 2 * off * slope * size / steep);
     const double moved = next - shift;
     shift = next;

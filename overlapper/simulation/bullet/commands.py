@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from copy import deepcopy
+from functools import lru_cache
 from typing import Any, Literal, NamedTuple
 
 import pybullet
@@ -84,6 +85,7 @@ class Commands:
         self.threshold: float | None = None
         """The solverResidualThreshold that the script has set, as far as it was heard."""
         self._length = 0.0  # of the steps for which the lasting commands were last repeated
+        self._whole = False  # whether these steps were those of the script
 
     def learn(self) -> None:
         """Read from pybullet the forces of constraints that were set before anybody listened.
@@ -111,7 +113,7 @@ class Commands:
         if length != self._length:
             for name, arguments in {id(each): each for each in self._lasting.values()}.values():
                 self._tell(name, arguments | _gains(name, arguments, share), arguments)
-            self._length = length
+            self._length, self._whole = length, share == 1
         if not first:
             for name, arguments in self._momentary:
                 self._tell(name, arguments)
@@ -165,8 +167,10 @@ class Commands:
             self._lasting, self._momentary = {}, []
             self.servos.clear()
             self.error_reduction, self.threshold = ERROR_REDUCTION, None
-        # pybullet took the command for the script's step length, which is not that of our substeps.
-        self._length = 0.0
+        # pybullet took the command for the script's step length. If that of our substeps is another one, all commands are
+        # repeated.
+        if not self._whole:
+            self._length = 0.0
 
     def _keep(self, keys: list[Any], command: Command) -> None:
         for key in keys:
@@ -193,6 +197,7 @@ def _by_joint(arguments: Arguments, aim: tuple[str, str], count: int) -> list[fl
     return [*arguments[many]] if many in arguments else [arguments.get(one, AIMS[aim])] * count
 
 
+@lru_cache
 def shorter(position_gain: float, velocity_gain: float, share: float) -> tuple[float, float]:
     """Return gains for steps whose length is this share of the script's time step.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import repeat
+from itertools import chain, repeat
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ SURFACE = (FRICTION, RESTITUTION, ROLLING, SPINNING)
 MOST_TORQUE = 10.0  # m: Bullet takes no larger coefficients for the torques of two bodies
 G = 9.81  # m/s²: bodies have a weight by this acceleration if there is no gravity
 HELD = (-1, 0, np.zeros(3), np.zeros(3))  # a base: no parent, no joint
+
+flattened = chain.from_iterable
 
 Known = tuple[list[Any], _core.ContactSolver]
 
@@ -176,8 +178,9 @@ class BulletDynamics:
         """The velocities of all coordinates: of bases in m/s and rad/s, in the world, and of joints in rad/s or m/s."""
         client = self._client
         velocity = np.empty(self.solver.coordinates)
-        bases = np.array([*map(pybullet.getBaseVelocity, self._joints, repeat(client))]).reshape(-1, 6)
-        velocity[self._of_bases] = bases
+        pairs = map(pybullet.getBaseVelocity, self._joints, repeat(client))
+        bases = np.fromiter(flattened(flattened(pairs)), float, 6 * len(self._joints))
+        velocity[self._of_bases] = bases.reshape(-1, 6)
         self._positions: list[tuple[int, int, float, int]] = []  # of joints: body, joint, position and coordinate
         for id, joints, at in self._single:
             states = pybullet.getJointStates(id, joints, client)
@@ -192,11 +195,11 @@ class BulletDynamics:
         servos = self._commands.servos
         if not servos:
             return None
-        rows = []
-        for id, joint, at, coordinate in self._positions:
-            servo = servos.get((id, joint))
-            if servo and servo.force > 0 and math.isfinite(at):
-                rows.append((coordinate, *servo.in_a_step(at, length, share)))
+        rows = [
+            (coordinate, *servo.in_a_step(at, length, share))
+            for id, joint, at, coordinate in self._positions
+            if (servo := servos.get((id, joint))) and servo.force > 0 and math.isfinite(at)
+        ]
         return np.array(rows).reshape(-1, 4)
 
     def constraints(self, length: float) -> Array | None:

@@ -55,7 +55,8 @@ def coming(
     # Bodies at rest bring no new contact.
     if np.abs(velocity).max(initial=0.0) * duration < STILL:
         return Coming()
-    if not frequencies and not masses.moves_far(duration, velocity):
+    ways = masses.ways(duration, velocity)
+    if not frequencies and not masses.may_meet(ways):
         return Coming()
     solver = masses.dynamics.solver.copy() if frequencies else None
     deep, highest = False, 0.0
@@ -65,7 +66,11 @@ def coming(
     lost: set[tuple[int, int]] = set()
     early, late, part = 0.0, 1.0, 1.0
     for _ in range(BISECTIONS):
-        found = masses.ahead(part * duration, velocity, among)
+        pairs, poses = masses.pairs_ahead(part * duration, velocity, among)
+        if not frequencies:
+            # A pair that overlaps already and moves by less than half of a size is not swallowed.
+            pairs = pairs[~np.isin(_codes(pairs), overlapping) | masses.are_far(pairs, ways)]
+        found = masses.overlaps_at(pairs, poses)
         if solver:
             highest = max(highest, float(masses.place(solver, frames, found)[0].max(initial=0.0)))
         new = np.flatnonzero((found.volume > 0) & ~np.isin(_codes(found.pairs), overlapping))

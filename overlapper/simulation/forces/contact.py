@@ -170,6 +170,7 @@ class VolumetricContact:
         self._unasked: tuple[Array, Array] | None = None
         self._parts: list[tuple[float, Forces]] = []  # of a step, the parts that substeps are, and their forces
         self._told = Told(bodies)
+        self._duration = 0.0  # s, of the step
         self._model()
         none = np.empty((0, 3))
         undirected, no_stiffness = np.empty(0, dtype=bool), np.empty(0)
@@ -205,7 +206,7 @@ class VolumetricContact:
             raise RuntimeError(
                 "step() must be called within `with contact:`, where the simulator does not push these pairs apart"
             )
-        duration = self.bodies.time_step
+        self._duration = duration = self.bodies.time_step
         self._mechanics.announce_begin()
         self._mechanics.prepare()
         self._refresh()
@@ -255,7 +256,7 @@ class VolumetricContact:
         self._refresh()
         velocity, lost = self._velocity()
         frequency2 = self._place(lost)
-        duration = self.bodies.time_step
+        self._duration = duration = self.bodies.time_step
         substeps = self._planned or self._needed(frequency2, velocity, Coming(), duration)
         self._solve(duration / substeps, velocity, frequency2)
         self._tell_of_depth(duration)
@@ -406,8 +407,9 @@ class VolumetricContact:
             self._refresh()
             velocity, lost = self._velocity()
             frequency2 = self._place(lost)
-            wrenches = self._solve(self.bodies.time_step, velocity, frequency2, whole=True)
-            self._tell_of_depth(self.bodies.time_step)
+            self._duration = self.bodies.time_step
+            wrenches = self._solve(self._duration, velocity, frequency2, whole=True)
+            self._tell_of_depth(self._duration)
         finally:
             self._told.further = 0
         self._masses.dynamics.apply(wrenches, self._frames)
@@ -513,7 +515,7 @@ class VolumetricContact:
             damped,
             self._layers.distributed,
             dynamics.ahead(duration, velocity) if len(self._contacts) else None,
-            dynamics.motors(duration, duration / self.bodies.time_step),
+            dynamics.motors(duration, duration / self._duration),
             dynamics.constraints(duration),
         )
         self._found = Forces(

@@ -21,10 +21,10 @@ from overlapper.simulation.model import Array
 # The largest number of lists of pairs whose laws are kept.
 REMEMBERED = 8
 
-# A patch is steady in a step in which its surfaces move over each other by less than this share of its depth, and turn by
-# less than this angle (rad). Otherwise a box that rests some nanometres deep may lose its contact, and would then fall
-# for a whole step.
-QUIET, STEADY = 0.5, 2e-2
+# A patch is steady in a step in which its surfaces move over each other by less than this share of its depth, and turn
+# by less than this angle (rad). Otherwise a box that rests some nanometres deep may lose its contact, and would then
+# fall for a whole step.
+QUIET, STEADY = 0.1, 2e-2
 
 # When two links meet, they are not deeper in each other than this share of the smaller link's size.
 SHALLOW = 5e-3
@@ -95,11 +95,19 @@ class Masses:
         """Whether one of the pairs (p, 2) of shapes is deeper than `SHALLOW` allows. Its depth in m is in `depths`."""
         return bool((depths > SHALLOW * self.sizes[self._links[pairs]].min(axis=1)).any())
 
-    def moves_far(self, duration: float, velocity: Array) -> bool:
-        """Whether a link may go deeper into another one than `SHALLOW` allows within a duration (s)."""
+    def ways(self, duration: float, velocity: Array) -> Array:
+        """(n,) m: the points of each link move by at most so much within a duration (s)."""
         _, travel = self.dynamics.solver.travel(duration, velocity)
-        way = travel[:, 0] + self._extents * travel[:, 1]
-        return bool(way.max(initial=0.0) > SHALLOW * self._smallest)
+        return np.asarray(travel[:, 0] + self._extents * travel[:, 1])
+
+    def may_meet(self, ways: Array) -> bool:
+        """Whether two links may become deeper in each other than `SHALLOW` allows, if links move by `ways` (n,)."""
+        return bool(ways.max(initial=0.0) > SHALLOW * self._smallest)
+
+    def are_far(self, pairs: NDArray[np.int32], ways: Array) -> NDArray[np.bool_]:
+        """(p,) whether two links of pairs (p, 2) of shapes may move by half of the smaller size in all."""
+        links = self._links[pairs]
+        return np.asarray(ways[links].sum(axis=1) > self.sizes[links].min(axis=1) / 2)
 
     def place(self, solver: ContactSolver, frames: Sequence[Pose], found: Overlaps) -> tuple[Array, Array]:
         """Give a solver the overlaps of links that have these frames.
@@ -138,14 +146,22 @@ class Masses:
         lost = {body for (body, _, _), placed in zip(self.keys, known.tolist()) if not placed}
         return np.where(finite, velocity, 0.0), lost
 
-    def ahead(self, duration: float, velocity: Array, among: Among) -> Overlaps:
-        """Return the overlaps after a duration (s) in which all coordinates keep this velocity."""
+    def pairs_ahead(
+        self, duration: float, velocity: Array, among: Among
+    ) -> tuple[NDArray[np.int32], tuple[Array, Array]]:
+        """Return the pairs whose boxes meet after a duration (s), and the poses of the shapes then.
+
+        All coordinates keep this velocity.
+        """
         bodies = self._bodies
         positions, orientations = self.dynamics.solver.ahead(
             duration, velocity, self._links, bodies.positions, bodies.orientations
         )
-        pairs = bodies.pairs_at(positions, orientations, among)
-        return self._batch.overlaps(positions, orientations, pairs, separated=False)
+        return bodies.pairs_at(positions, orientations, among), (positions, orientations)
+
+    def overlaps_at(self, pairs: NDArray[np.int32], poses: tuple[Array, Array]) -> Overlaps:
+        """Return the overlaps of these pairs at poses that are not those now."""
+        return self._batch.overlaps(*poses, pairs, separated=False)
 
 
 def _sizes(shapes: Sequence[Shape], links: NDArray[np.int64], tops: Array | None, count: int) -> Array:
