@@ -113,11 +113,11 @@ SCENES: dict[str, Callable[[int], None]] = {
 class Scene:
     """A scene that is stepped with volumetric contact, and how long each part of a substep took."""
 
-    def __init__(self, build: Callable[[int], None], stack: ExitStack) -> None:
+    def __init__(self, build: Callable[[int], None], stack: ExitStack, **given: float) -> None:
         self.client = p.connect(p.DIRECT)
         stack.callback(p.disconnect, self.client)
         build(self.client)
-        self.contact = stack.enter_context(VolumetricContact(Bodies(self.client), dissipation=1e-3))
+        self.contact = stack.enter_context(VolumetricContact(Bodies(self.client), **given))
         self.taken: dict[str, list[float]] = {}
         self.deepest = 0.0
 
@@ -140,7 +140,7 @@ class Scene:
 
 def measured() -> Iterator[tuple[str, str, float]]:
     with parts_timed() as watch, ExitStack() as stack:
-        scenes = {name: Scene(build, stack) for name, build in SCENES.items()}
+        scenes = {name: Scene(build, stack, dissipation=1e-3) for name, build in SCENES.items()}
         for step in range(STEPS + 20):
             for scene in scenes.values():
                 scene.step(watch)

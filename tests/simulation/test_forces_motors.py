@@ -10,6 +10,7 @@ from contact_experiments import World
 from simulated import jointed
 
 from overlapper.simulation import Bodies, VolumetricContact
+from overlapper.simulation.bullet.dynamics import BulletDynamics
 
 STEP, HALF, DEPTH, STIFFNESS, TAU = 1 / 240, 0.05, 1e-4, 1e6, 1e-3
 ONE, MANY = "setJointMotorControl2", "setJointMotorControlArray"
@@ -95,3 +96,14 @@ def test_a_motor_that_is_not_known_pushes_as_in_the_step_before(world):
         for _ in range(240):
             contact.step()
     assert abs(contact.force[0, 2]) == pytest.approx(3, rel=1e-3)
+
+
+@pytest.mark.parametrize("substeps", [1, 4])
+def test_the_gains_of_motors_are_those_of_their_part_of_a_step_in_each_substep(world, monkeypatch, substeps):
+    """Within a step, pybullet reports the length of a substep as its time step."""
+    shares, motors = [], BulletDynamics.motors
+    monkeypatch.setattr(BulletDynamics, "motors", lambda self, *args: shares.append(args) or motors(self, *args))
+    leg(world)
+    with VolumetricContact(Bodies(world.client), substeps=substeps, dissipation=TAU) as contact:
+        contact.step()
+    assert shares == [(pytest.approx(STEP / substeps), pytest.approx(1 / substeps))] * substeps
