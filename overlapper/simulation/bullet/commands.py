@@ -167,8 +167,7 @@ class Commands:
             self._lasting, self._momentary = {}, []
             self.servos.clear()
             self.error_reduction, self.threshold = ERROR_REDUCTION, None
-        # pybullet took the command for the script's step length. If that of our substeps is another one, all commands are
-        # repeated.
+        # pybullet took the command for the script's step length. Substeps of another length need all commands again.
         if not self._whole:
             self._length = 0.0
 
