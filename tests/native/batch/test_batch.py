@@ -421,3 +421,20 @@ def test_boxes_that_touch_within_rounding_are_a_pair():
     cube, beside = Box([1, 1, 1]), np.nextafter(2.0, 3.0)
     assert overlap(cube, Placed(cube, (beside, 0, 0))).status == "touching"
     assert len(overlaps([cube, cube], [[0, 0, 0], [beside, 0, 0]], [[0, 0, 0, 1]] * 2)) == 1
+
+
+def test_patches_are_those_of_new_batches_once_they_were_asked_of_earlier_results():
+    """The batch then finds them with the measures, and keeps those of pairs that rest."""
+    rng = np.random.default_rng(5)
+    shapes, positions, orientations = scene(rng)
+    batch = Batch(shapes)
+    for step in range(4):
+        found = batch.overlaps(positions, orientations)
+        fresh = Batch(shapes).overlaps(positions, orientations)
+        chosen = np.flatnonzero(found.volume > 0)[::2]
+        for name in ("patch_centre", "patch_moments", "patch_distance"):
+            assert_array_equal(getattr(found, name), getattr(fresh, name))
+            assert_array_equal(getattr(found[chosen], name), getattr(fresh, name)[chosen])
+        if step != 1:
+            positions, orientations = walk(rng, positions, orientations)
+    assert (fresh.volume > 0).any()
