@@ -1654,7 +1654,7 @@ class ContactSolver:
         Another one that knows the same of the last step: what it solves changes nothing here.
         """
 
-    def place(self, frames: Sequence[Any], overlaps: Overlaps, links: numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike, recovery: numpy.typing.ArrayLike | None = None, restitution: numpy.typing.ArrayLike | None = None, rolling: numpy.typing.ArrayLike | None = None, spinning: numpy.typing.ArrayLike | None = None, tops: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+    def place(self, frames: Sequence[Any], overlaps: Overlaps, links: numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike, recovery: numpy.typing.ArrayLike | None = None, restitution: numpy.typing.ArrayLike | None = None, rolling: numpy.typing.ArrayLike | None = None, spinning: numpy.typing.ArrayLike | None = None, tops: numpy.typing.ArrayLike | None = None, hardening: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         Put the links where they are, and take what their shapes share; `links` (k,) is the place of each shape's link.
 
@@ -1663,7 +1663,8 @@ class ContactSolver:
         in s, by which pressures follow the mean motion of the two links along the normal besides the dissipation; `restitution`,
         the speed after an impact over the speed before, which needs a recovery; `rolling` and `spinning` in m, the torques
         against rolling and against spinning over the force. Friction on the area resists spinning besides. `tops` (k, 3) has the normal of the top of each prism of a height field, in the frame of the prism,
-        and zeros for other shapes. A prism presses with its top alone, because its vertical walls are inside the field. The
+        and zeros for other shapes. A prism presses with its top alone, because its vertical walls are inside the field.
+        `hardening` in 1/m is c of the pressure k d (1 + c d) at the depth d. It must be 0 for pairs without a half-space. The
         answer (p,) is the square of a frequency,
         (rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.
         """

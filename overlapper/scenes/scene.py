@@ -37,7 +37,7 @@ ContactModel = Literal["bullet", "mujoco", "volumetric"]
 """The forces that push bodies apart: those of the scene's engine, or of volumetric contact."""
 
 # The arguments that a scene may give simulation.VolumetricContact.
-TOLD = frozenset({"stiffness", "dissipation", "friction", "substeps", "restitution", "rolling"})
+TOLD = frozenset({"stiffness", "dissipation", "friction", "substeps", "restitution", "rolling", "hardening"})
 
 
 class SceneError(Exception):

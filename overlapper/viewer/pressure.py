@@ -1,6 +1,7 @@
 """Forces as they are drawn: pressures as colours, and an arrow for each pair of links.
 
-A pressure is stiffness times the extent of the overlap along the direction of the pressures. The colours are viridis.
+A pressure is stiffness times the extent of the overlap along the direction of the pressures, with the hardening of the
+contact. The colours are viridis.
 Differences of colour are in proportion to differences of value, for colour-blind readers, too. Higher pressures are
 lighter.
 """
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,13 +47,15 @@ class Forces(Protocol):
     def normal(self) -> Array: ...
     @property
     def stiffness(self) -> Array: ...
+    @property
+    def hardening(self) -> Array: ...
 
 
 @dataclass(frozen=True)
 class Press:
     """The `force` (3,) on the first of a pair in N, and its torque, energy, slip and stiffness in N m, J, m/s and Pa/m.
 
-    `normal` (3,) is the unit direction of the pressures. Friction is the part of the force across it.
+    `hardening` is in 1/m. `normal` (3,) is the unit direction of the pressures. Friction is the force across it.
     """
 
     force: Array
@@ -61,11 +64,16 @@ class Press:
     slip: float
     normal: Array
     stiffness: float
+    hardening: float = 0.0
 
     @property
     def friction(self) -> Array:
         across: Array = self.force - (self.force @ self.normal) * self.normal
         return across
+
+    def pressure(self, depth: Any) -> Any:
+        """The pressures in Pa at these depths in m."""
+        return self.stiffness * depth * (1 + self.hardening * depth)
 
 
 def presses(forces: Forces | None) -> dict[Key, Press]:
@@ -74,8 +82,10 @@ def presses(forces: Forces | None) -> dict[Key, Press]:
         return {}
     torque, slip = (np.linalg.norm(each, axis=1) for each in (forces.torque, forces.slip))
     return {
-        tuple(key): Press(forces.force[row], torque[row], forces.energy[row], slip[row], forces.normal[row], stiffness)
-        for row, (key, stiffness) in enumerate(zip(forces.pairs.tolist(), forces.stiffness.tolist(), strict=True))
+        tuple(key): Press(forces.force[row], torque[row], forces.energy[row], slip[row], forces.normal[row], *laws)
+        for row, (key, *laws) in enumerate(
+            zip(forces.pairs.tolist(), forces.stiffness.tolist(), forces.hardening.tolist(), strict=True)
+        )
     }
 
 
@@ -111,7 +121,7 @@ def pressures(overlap: Overlap, press: Press, top: float) -> tuple[Array, Array]
     for halving in range(HALVINGS + 1):
         points = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
         within = points + RIM * (middles[facet][:, None] - points)
-        found = press.stiffness * depths(overlap, press.normal, within)
+        found = press.pressure(depths(overlap, press.normal, within))
         even = (np.ptp(np.minimum(found, top), axis=1) <= STEP * top) | (halving == HALVINGS)
         done.append((corners[even], found[even, :3]))
         corners, facet = corners[~even], np.tile(facet[~even], 4)
@@ -205,7 +215,7 @@ class DrawnForces:
         found = arrows(bodies, contacts, pressed, framing.pushed_second) if pressed else []
         overlapping = [each for each in contacts if each.overlap and key_of(each) in pressed]
         tops = [
-            press.stiffness * deepest(to_draw(each.overlap, framing.size), press.normal)
+            press.pressure(deepest(to_draw(each.overlap, framing.size), press.normal))
             for each in overlapping
             for press in [pressed[key_of(each)]]
         ]

@@ -80,9 +80,9 @@ ARRAYS |= {"int16": "Int16Array", "uint8": "Uint8Array"}
 
 # Columns and their bits: volume; its error, whose first digit is shown; depth, area and centroid; normal.
 NUMBERS = [(slice(0, 1), 17), (slice(1, 2), 6), (slice(2, 7), 17), (slice(7, 10), 14)]
-# The same for force, torque, energy and slip; direction of the pressures; stiffness.
-PRESSES = [(slice(0, 6), 17), (slice(6, 9), 14), (slice(9, 10), 17)]
-UNPRESSED = (0.0,) * 10
+# The same for force, torque, energy and slip; direction of the pressures; stiffness and hardening.
+PRESSES = [(slice(0, 6), 17), (slice(6, 9), 14), (slice(9, 11), 17)]
+UNPRESSED = (0.0,) * 11
 
 
 class Recording:
@@ -309,7 +309,7 @@ class Recording:
     def _pressing(self) -> dict[str, NDArray[Any]]:
         """The arrays of forces; empty if the recording has no forces."""
         rows = self._presses if self._usual else []
-        columns = np.array(rows, dtype=np.float32).reshape(-1, 10)
+        columns = np.array(rows, dtype=np.float32).reshape(-1, len(UNPRESSED))
         return {
             "presses": np.hstack([_rounded(columns[:, column], bits) for column, bits in PRESSES]).T,
             "planes": np.concatenate(self._polytopes.planes).T if rows else np.empty(0, np.float32),
@@ -345,10 +345,11 @@ class Recording:
             self._presses.append(UNPRESSED)
             return 0.0
         measured = press.torque, press.energy, press.slip
-        self._presses.append((*press.force, *measured, *press.normal, press.stiffness))
+        self._presses.append((*press.force, *measured, *press.normal, press.stiffness, press.hardening))
         if polytope not in self._depths:
             self._depths[polytope] = deepest(to_draw(self._drawn[pair][0], stage.size), press.normal)
-        return press.stiffness * self._depths[polytope]
+        pressure: float = press.pressure(self._depths[polytope])
+        return pressure
 
 
 @dataclass

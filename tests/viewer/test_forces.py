@@ -143,10 +143,10 @@ def white(image):
 def test_a_recording_has_force_torque_energy_slip_direction_and_stiffness_of_each_pair(client, tmp_path):
     bodies, forces = pressed_cube(client)
     film = Film.of(record(tmp_path / "cube.html", bodies, forces))
-    found = film.arrays["presses"].reshape(10, -1).T
+    found = film.arrays["presses"].reshape(11, -1).T
     assert_allclose(found[0, :3], forces.force[0], rtol=1e-5, atol=1e-7)
     assert_allclose(found[0, 3:6], [0, forces.energy[0], np.linalg.norm(forces.slip[0])], rtol=1e-4, atol=1e-9)
-    assert_allclose(found[0, 6:], [0, 0, -1, STIFFNESS], atol=1e-6)
+    assert_allclose(found[0, 6:], [0, 0, -1, STIFFNESS, 0], atol=1e-6)
     assert_allclose(forces.energy[0], STIFFNESS * 0.01 * 1e-3**2 / 2)
     planes = film.arrays["planes"].reshape(4, -1).T
     ((vertices, facets),) = film.polytopes()
@@ -246,7 +246,7 @@ def test_a_run_with_volumetric_contact_is_recorded_with_its_forces(tmp_path):
     (page,) = written
     film = Film.of(page)
     assert film.heading["forces"]["on_second"] == [True]
-    assert film.arrays["presses"].reshape(10, -1)[2].max() < -1  # the first is the plane
+    assert film.arrays["presses"].reshape(11, -1)[2].max() < -1  # the first is the plane
 
 
 def picture_of(client, path, look=OVERLAPS, forces=True):

@@ -83,6 +83,7 @@ class Push:
     energy = np.zeros(1)
     normal = np.array([[-1.0, 0.0, 0.0]])
     stiffness: np.ndarray = field(default_factory=lambda: np.array([1e5]))
+    hardening = np.zeros(1)
 
 
 def test_a_live_view_has_an_arrow_and_tells_its_scale_until_forces_are_gone():

@@ -149,7 +149,7 @@ void ContactSolver::share_damping() {
       of_links[{patch.link_a, patch.link_b}].push_back(i);
     } else {
       // A body without a direction leaves the other one with its own size over the time of recovery at most.
-      const double size = std::cbrt(patch.force / patch.stiffness);
+      const double size = std::cbrt(patch.volume);
       rows_[i].damping = patch.recovery * patch.stiffness * size * size;
     }
   }
@@ -160,7 +160,7 @@ void ContactSolver::share_damping() {
       for (int j : group) {
         const ElasticPatch& other = patches_[j];
         const double same = j == i ? 1 : std::max(0.0, overlapper::dot(patches_[i].normal, other.normal));
-        stiffness += same * other.stiffness * rows_[j].area.area;
+        stiffness += same * other.stiffness * (rows_[j].area.area + other.hardened);
         force += same * other.force;
         if (j != i && same > 0) shares.push_back({j, same * other.force});
       }

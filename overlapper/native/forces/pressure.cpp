@@ -17,7 +17,14 @@ double ahead(Rule rule) { return rule == Rule::kKeeping ? 0.25 : 1; }
 
 }  // namespace
 
-PlaneArea::PlaneArea(const ElasticPatch& patch, Vec3 along, Vec3 across) : area(patch.area), distance(patch.distance) {
+PlaneArea::PlaneArea(const ElasticPatch& patch, Vec3 along, Vec3 across)
+    : area(patch.area),
+      distance(patch.distance),
+      rest{patch.force, overlapper::dot(along, patch.torque), overlapper::dot(across, patch.torque)},
+      hardened(patch.hardened) {
+  const Vec3 hu = patch.hardened_moments * along, hv = patch.hardened_moments * across;
+  hardened_uu = overlapper::dot(along, hu), hardened_uv = overlapper::dot(along, hv);
+  hardened_vv = overlapper::dot(across, hv);
   if (!(area > 0)) {
     area = u = v = uu = uv = vv = distance = 0;
     return;
@@ -31,9 +38,16 @@ PlaneArea::PlaneArea(const ElasticPatch& patch, Vec3 along, Vec3 across) : area(
 ThreeByThree PlaneArea::foundation(double stiffness) const {
   // A point at (u, v) moves along the normal by 1, by v about the first axis, and by -u about the second.
   const double k = stiffness * area;
-  return {{{k, k * v, -k * u},
-           {k * v, k * (vv + v * v), -k * (uv + u * v)},
-           {-k * u, -k * (uv + u * v), k * (uu + u * u)}}};
+  ThreeByThree found{{{k, k * v, -k * u},
+                      {k * v, k * (vv + v * v), -k * (uv + u * v)},
+                      {-k * u, -k * (uv + u * v), k * (uu + u * u)}}};
+  if (hardened > 0) {
+    // The centroid is the origin, so the volume adds no first moments.
+    found[0][0] += stiffness * hardened;
+    found[1][1] += stiffness * hardened_vv, found[2][2] += stiffness * hardened_uu;
+    found[1][2] -= stiffness * hardened_uv, found[2][1] -= stiffness * hardened_uv;
+  }
+  return found;
 }
 
 Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility,
@@ -45,7 +59,7 @@ Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const Three
   response_[0][0] += damping.factor;  // tipping and rolling are not damped
   // Backward Euler depends on the velocity at the end only. The other rule depends on the change of the velocity.
   const Three known = (rule == Rule::kKeeping ? lead : 0) * (foundation * before);
-  rest_ = Three{patch.force, 0, 0} + known;
+  rest_ = area.rest + known;
   // The pressure aims at the speed of a bounce if this is more than what the depth gives back.
   if (patch.restitution > 0 && damping.approach < -kImpact)
     rest_[0] = std::max(patch.force, -patch.restitution * response_[0][0] * damping.approach);

@@ -99,6 +99,22 @@ bool has_direction(const Overlaps& found, size_t row, double size) {
   return size > kNoDirection * found.area_bound[row] || (size > 0 && size > kNoDirection * found.overlap(row)->area());
 }
 
+/// Gives a patch pressures that grow faster than the depth below the half-space of its pair.
+void harden(ElasticPatch& patch, double hardening, const Overlaps& found, size_t row) {
+  for (int shape : found.pairs[row]) {
+    const HalfSpace* half = std::get_if<HalfSpace>(&(*found.shapes)[shape]);
+    if (!half) continue;
+    const PoseNumbers& p = (*found.poses)[shape];
+    const Pose pose = make_placed(*half, {p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}).pose;
+    const Vec3 normal = pose.rotation * half->plane.normal, out = patch.centroid - pose.translation;
+    Mat3 spread = found.overlap(row)->inertia();
+    const double trace = (spread.row0.x + spread.row1.y + spread.row2.z) / 2;
+    spread = {Vec3{trace, 0, 0} - spread.row0, Vec3{0, trace, 0} - spread.row1, Vec3{0, 0, trace} - spread.row2};
+    return patch.harden(hardening, half->plane.offset - dot(normal, out), spread, normal);
+  }
+  fail("hardening", "must be 0 for pairs without a half-space");
+}
+
 /// The patch of each row: that of the top for prisms.
 std::vector<Patch> patches_of(const Overlaps& found, std::span<const std::optional<Top>> tops) {
   std::vector<Patch> patches;
@@ -120,7 +136,7 @@ std::vector<Patch> patches_of(const Overlaps& found, std::span<const std::option
 nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps& found, nb::handle links_given,
                  nb::handle stiffness_given, nb::handle dissipation_given, nb::handle friction_given,
                  nb::handle recovery_given, nb::handle restitution_given, nb::handle rolling_given,
-                 nb::handle spinning_given, nb::handle tops_given) {
+                 nb::handle spinning_given, nb::handle tops_given, nb::handle hardening_given) {
   std::vector<Pose> frames;
   for (nb::handle each : frames_given) frames.push_back(to_pose(each));
   const size_t count = found.size(), links = size_t(solver.bodies().links());
@@ -136,6 +152,7 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
   const auto restitution = optional(restitution_given, "restitution");
   const auto rolling = optional(rolling_given, "rolling");
   const auto spinning = optional(spinning_given, "spinning");
+  const auto hardening = optional(hardening_given, "hardening");
   std::vector<Vec3> tops(link_of.size());
   if (!tops_given.is_none()) tops = to_rows(tops_given, "tops");
   if (tops.size() != link_of.size()) fail("tops", "must have a row for each shape");
@@ -155,13 +172,15 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
     patch.recovery = recovery[i], patch.restitution = restitution[i];
     patch.friction = friction[i], patch.rolling = rolling[i], patch.spinning = spinning[i];
     if (found.status[i] != std::int8_t(Status::kOverlapping)) continue;
-    patch.force = stiffness[i] * found.volume[i];
+    patch.volume = found.volume[i], patch.force = stiffness[i] * found.volume[i];
     patch.centroid = found.centroid[i];
     const auto& [area, centre, moments, distance] = shared[i];
-    if (!has_direction(found, i, norm(area)) || !finite(centre)) continue;
-    patch.area = norm(area);
-    patch.normal = unit(area);
-    patch.centre = centre, patch.moments = moments, patch.distance = distance;
+    if (has_direction(found, i, norm(area)) && finite(centre)) {
+      patch.area = norm(area);
+      patch.normal = unit(area);
+      patch.centre = centre, patch.moments = moments, patch.distance = distance;
+    }
+    if (hardening[i] > 0) harden(patch, hardening[i], found, i);
   }
   std::vector<double> frequency2 = solver.place(frames, std::move(patches));
   const size_t rows = frequency2.size();
@@ -350,14 +369,14 @@ numbers for the coordinates of its tree; w is the size of the largest tree.)");
   cls.def(
       "place", &place, "frames"_a, "overlaps"_a, "links"_a, "stiffness"_a, "dissipation"_a, "friction"_a,
       "recovery"_a.none() = nb::none(), "restitution"_a.none() = nb::none(), "rolling"_a.none() = nb::none(),
-      "spinning"_a.none() = nb::none(), "tops"_a.none() = nb::none(),
+      "spinning"_a.none() = nb::none(), "tops"_a.none() = nb::none(), "hardening"_a.none() = nb::none(),
       nb::sig(
           "def place(self, frames: collections.abc.Sequence[typing.Any], overlaps: Overlaps, links: "
           "numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: "
           "numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike, recovery: numpy.typing.ArrayLike | None = None, "
           "restitution: numpy.typing.ArrayLike | None = None, rolling: numpy.typing.ArrayLike | None = None, "
           "spinning: numpy.typing.ArrayLike | None = None, "
-          "tops: numpy.typing.ArrayLike | None = None) "
+          "tops: numpy.typing.ArrayLike | None = None, hardening: numpy.typing.ArrayLike | None = None) "
           "-> numpy.typing.NDArray[numpy.float64]"),
       R"(Put the links where they are, and take what their shapes share; `links` (k,) is the place of each shape's link.
 
@@ -366,15 +385,15 @@ stiffness in Pa/m, dissipation in s, and the coefficient of friction. The others
 in s, by which pressures follow the mean motion of the two links along the normal besides the dissipation; `restitution`,
 the speed after an impact over the speed before, which needs a recovery; `rolling` and `spinning` in m, the torques
 against rolling and against spinning over the force. Friction on the area resists spinning besides. `tops` (k, 3) has the normal of the top of each prism of a height field, in the frame of the prism,
-and zeros for other shapes. A prism presses with its top alone, because its vertical walls are inside the field. The
+and zeros for other shapes. A prism presses with its top alone, because its vertical walls are inside the field.
+`hardening` in 1/m is c of the pressure k d (1 + c d) at the depth d. It must be 0 for pairs without a half-space. The
 answer (p,) is the square of a frequency,
 (rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.)");
   cls.def_prop_ro(
       "depths",
       [](const ContactSolver& self) {
         std::vector<double> found;
-        for (const ElasticPatch& each : self.patches())
-          found.push_back(each.area > 0 ? each.force / each.stiffness / each.area : 0);
+        for (const ElasticPatch& each : self.patches()) found.push_back(each.area > 0 ? each.volume / each.area : 0);
         const size_t count = found.size();
         return nb::cast(to_numpy<Vector>(std::move(found), {count}), nb::rv_policy::move);
       },

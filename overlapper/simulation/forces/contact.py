@@ -72,6 +72,10 @@ class VolumetricContact:
         The largest torque against rolling over the force, m. Default: that of the simulator. In pybullet it is the
         rollingFriction of each link times the lateralFriction of the other link, added. In MuJoCo it is the rolling
         friction of contacts of dimension 6.
+    hardening : float or callable, optional
+        Growth of the stiffness with the depth, 1/m: the pressure at the depth d is stiffness * d * (1 + hardening * d).
+        Default: 0, which is the linear law. It is for contacts with half-spaces alone, such as planes and the ground.
+        It must be 0 for other pairs, whose patches are not flat, and must not be given with "distributed" friction.
 
     Raises
     ------
@@ -91,11 +95,16 @@ class VolumetricContact:
     parts is the sum of the forces on its parts, as if the parts were one body. Where the parts overlap each other, the
     force counts twice.
 
-    `stiffness`, `dissipation` and `friction` may be functions of the pair of links, as in stiffness=lambda a, b: ....
-    The arguments are two (body, link), in MuJoCo two (body, geom). The function is called once for each pair.
+    `stiffness`, `dissipation`, `friction`, `restitution`, `rolling` and `hardening` may be functions of the pair of
+    links, as in stiffness=lambda a, b: .... The arguments are two (body, link), in MuJoCo two (body, geom). Numbers of
+    pairs are kept as long as the bodies and their masses are the same.
 
     A patch resists slip and spin together: its force and torque stay within an ellipsoid. Sticking bodies do not creep.
     The simulator's spinning friction adds to the torque of the patch.
+
+    With a `hardening` c and a stiffness k, the force of a volume V below a plane is k V (1 + 2 c z), where z is the
+    depth of the centroid. This force has a torque about the centroid, by the second moments of the volume. A box of
+    area A and weight W rests at the depth d where k A d (1 + c d) = W.
 
     The solver solves the laws of all pairs together, to a `residual` of 1e-8 of the largest slip. If bodies that touch
     each other have more than 300 coordinates, their pairs are solved one after the other, 10,000 times in all. A
@@ -151,6 +160,7 @@ class VolumetricContact:
         substeps: int | Literal["auto"] = "auto",
         restitution: float | OfPair | None = None,
         rolling: float | OfPair | None = None,
+        hardening: float | OfPair | None = None,
     ) -> None:
         if not isinstance(bodies, AnyBodies):
             raise TypeError(f"bodies must be the Bodies of a simulation, not {bodies!r}")
@@ -159,7 +169,7 @@ class VolumetricContact:
         self._among: Among = among if isinstance(among, str) else listed(among)
         bodies.update()
         bodies.link_pairs(self._among)  # says what is wrong with them
-        self._layers = Layers(stiffness, dissipation, friction, restitution, rolling)
+        self._layers = Layers(stiffness, dissipation, friction, restitution, rolling, hardening)
         whole = isinstance(substeps, (int, np.integer)) and not isinstance(substeps, bool)
         if substeps != "auto" and not (whole and int(substeps) >= 1):
             raise ValueError(f"substeps must be a whole number from 1, or 'auto', not {substeps!r}")
@@ -173,8 +183,8 @@ class VolumetricContact:
         self._duration = 0.0  # s, of the step
         self._model()
         none = np.empty((0, 3))
-        undirected, no_stiffness = np.empty(0, dtype=bool), np.empty(0)
-        self._found = Forces(bodies.overlaps(pairs=[]), none, none, none, none, undirected, no_stiffness, bodies.frames)
+        undirected, zero = np.empty(0, dtype=bool), np.empty(0)
+        self._found = Forces(bodies.overlaps(pairs=[]), none, none, none, none, undirected, zero, zero, bodies.frames)
         self.substeps = 0
         """The number of substeps of the last step."""
         self.sweeps = 0
@@ -278,7 +288,8 @@ class VolumetricContact:
         self._follow()
         contacts, masses = self.bodies.overlaps(pairs=self._among), self._masses
         found = contacts.overlaps
-        return mean(contacts, self._parts, masses.stiffness(found), masses.areas(found), self.bodies.frames)
+        laws = masses.stiffness(found), masses.hardening(found)
+        return mean(contacts, self._parts, *laws, masses.areas(found), self.bodies.frames)
 
     @property
     def last(self) -> Forces:
@@ -441,6 +452,7 @@ class VolumetricContact:
     def _model(self) -> None:
         """Read the masses and joints of the bodies."""
         self._masses = Masses(self.bodies, self._mechanics, self._layers)
+        self._layers.check(self.bodies.link_pairs(self._among), self._masses.flat_links())
         self._others = self._masses.dynamics.other_forces()
 
     @property
@@ -519,7 +531,8 @@ class VolumetricContact:
             dynamics.constraints(duration),
         )
         self._found = Forces(
-            self._contacts, force, torque, slip, normal, directed, self._stiffness, self._frame, residual
+            *(self._contacts, force, torque, slip, normal, directed, self._stiffness),
+            *(self._masses.hardening(self._contacts.overlaps), self._frame, residual),
         )
         self._told.of_residual(residual, self.sweeps)
         if not directed.all():

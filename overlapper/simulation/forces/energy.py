@@ -14,11 +14,11 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
 NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
 
 
-def energies(found: Overlaps, normals: Array, stiffness: Array) -> Array:
+def energies(found: Overlaps, normals: Array, stiffness: Array, hardening: Array) -> Array:
     """(p,) J: the work of pressures while each pair is drawn apart along its normal (p, 3).
 
     This work is stiffness times the integral of the volume over the way. If one of a pair is a half-space, the work is
-    stiffness times volume times the depth of the centroid.
+    stiffness times the integral of z (1 + hardening z) over the volume. Here z is the depth below the plane.
     """
     result = np.zeros(len(found))
     for row in np.flatnonzero(found.status == Overlaps.OVERLAPPING).tolist():
@@ -28,16 +28,21 @@ def energies(found: Overlaps, normals: Array, stiffness: Array) -> Array:
         if plane is None:
             result[row] = stiffness[row] * _work(a, b, normals[row], np.ptp(overlap.vertices @ normals[row]))
         else:
-            result[row] = stiffness[row] * overlap.volume * _depth(plane, overlap.centroid)
+            depth, normal = _below(plane, overlap.centroid)
+            result[row] = stiffness[row] * overlap.volume * depth
+            if hardening[row] > 0:
+                square = np.trace(overlap.inertia) / 2 - normal @ overlap.inertia @ normal + overlap.volume * depth**2
+                result[row] += stiffness[row] * hardening[row] * square
     return result
 
 
-def _depth(plane: Placed, point: Array) -> float:
-    """Return how far a point is below the plane of a half-space, in m."""
+def _below(plane: Placed, point: Array) -> tuple[float, Array]:
+    """Return how far a point is below the plane of a half-space, in m, and the normal (3,) of the plane."""
     side = facts(plane.shape).side(point)
     assert side is not None
     normal, offset, _ = side
-    return float(offset - rotated(plane.orientation, normal) @ (point - plane.position))
+    normal = rotated(plane.orientation, normal)
+    return float(offset - normal @ (point - plane.position)), normal
 
 
 def _work(a: Placed, b: Placed, normal: Array, way: float) -> float:

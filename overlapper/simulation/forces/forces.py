@@ -47,6 +47,8 @@ class Forces(Tabular):
         False where the overlap has no direction. `normal` is then the last known one.
     stiffness : (p,) ndarray
         In Pa/m.
+    hardening : (p,) ndarray
+        In 1/m. See `VolumetricContact`.
     frame : callable
         Returns position and quaternion xyzw of the frame of a link (body, link), at the time of the contacts.
     residual : float, default 0
@@ -62,6 +64,7 @@ class Forces(Tabular):
     normal: Array
     directed: NDArray[np.bool_]
     stiffness: Array
+    hardening: Array
     frame: Callable[[LinkKey], Pose]
     residual: float = 0.0
 
@@ -84,10 +87,11 @@ class Forces(Tabular):
         """(p,) the energy in J that the pressures store.
 
         It is half of stiffness times the square of the depth, integrated over the patch. It is computed when it is
-        first asked for. For a pair with a half-space, it follows from the depth of the centroid. Otherwise it is the
-        work of drawing the two apart along the normal, computed from 16 volumes for each pair.
+        first asked for. For a pair with a half-space, it follows from the depth of the centroid. A hardening adds its
+        part from the second moments of the volume. Otherwise the energy is the work of drawing the two apart along the
+        normal, computed from 16 volumes for each pair.
         """
-        return energies(self.contacts.overlaps, self.normal, self.stiffness)
+        return energies(self.contacts.overlaps, self.normal, self.stiffness, self.hardening)
 
     def on(self, body: int, link: int | None = None) -> tuple[Array, Array]:
         """Force and torque on a body or on a link of it, from all pairs.
@@ -155,7 +159,8 @@ class Forces(Tabular):
         TypeError
             If `grid` is something else.
         ValueError
-            If there is no such link, it has no modelled shape, or `tolerance` is invalid.
+            If there is no such link, it has no modelled shape, `tolerance` is invalid, or a contact of the link has a
+            `hardening`.
         """
         if not isinstance(grid, Pad):
             raise TypeError(f"grid must be a TaxelGrid or Taxels, not {grid!r}")
@@ -163,6 +168,9 @@ class Forces(Tabular):
             raise ValueError(f"link must be (body, link), not {link!r}")
         self._check(*link)
         Asking(tolerance=tolerance)  # raises for an invalid value
+        touching = (self.pairs[:, :2] == link).all(axis=1) | (self.pairs[:, 3:5] == link).all(axis=1)
+        if (self.hardening[touching] > 0).any():
+            raise ValueError(f"pressure of {link} is known for a hardening of 0 alone, where it is linear in the depth")
         try:
             frame = self.frame(link)
         except KeyError:
@@ -227,13 +235,15 @@ def mean(
     contacts: Contacts,
     parts: Sequence[tuple[float, Forces]],
     stiffness: Array,
+    hardening: Array,
     area: Array,
     frame: Callable[[LinkKey], Pose],
 ) -> Forces:
     """Return the mean forces of a step for the overlaps now, with the frames of links now.
 
     `parts` are the parts of the step: each has its fraction of the step and its forces. `slip` is that of the last
-    part. `stiffness` (p,) in Pa/m and the area vectors `area` (p, 3) in m² are those of the contacts.
+    part. `stiffness` (p,) in Pa/m, `hardening` (p,) in 1/m and the area vectors `area` (p, 3) in m² are those of the
+    contacts.
     """
     found = contacts.overlaps
     count = 1 + max(int(each.pairs.max(initial=0)) for each in (found, *(part.contacts.overlaps for _, part in parts)))
@@ -254,7 +264,7 @@ def mean(
             lost = ~directed[now]
             normal[now[lost]] = forces.normal[then[lost]]
     residual = max((forces.residual for _, forces in parts), default=0.0)
-    return Forces(contacts, force, torque, slip, normal, directed, stiffness, frame, residual)
+    return Forces(contacts, force, torque, slip, normal, directed, stiffness, hardening, frame, residual)
 
 
 def _codes(found: Overlaps, count: int) -> NDArray[np.int64]:

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from overlapper import Batch, Overlaps, Shape
 from overlapper._core import ContactSolver
 from overlapper.quaternion import rotated
+from overlapper.shapes.table import facts
 from overlapper.simulation.asked_pairs import Among
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.forces.parameter import Layers
 from overlapper.simulation.layout import FARTHEST, Pose
 from overlapper.simulation.mechanics import Mechanics
-from overlapper.simulation.model import Array
+from overlapper.simulation.model import Array, LinkKey
 
 # The largest number of lists of pairs whose laws are kept.
 REMEMBERED = 8
@@ -64,9 +65,18 @@ class Masses:
         """(p,) the stiffness of each row in Pa/m."""
         return self._of(found).laws["stiffness"]
 
+    def hardening(self, found: Overlaps) -> Array:
+        """(p,) the hardening of each row in 1/m."""
+        return self._of(found).laws.get("hardening", np.zeros(len(found)))
+
     def sizes_of(self, found: Overlaps) -> Array:
         """(p,) the size of the smaller link of each row in m: the diameter of a ball of its volume."""
         return self._of(found).sizes
+
+    def flat_links(self) -> set[LinkKey]:
+        """The links (body, link) that consist of half-spaces."""
+        bounded = {key[:2] for key, shape in zip(self.keys, self._bodies.shapes) if facts(shape).bounded}
+        return {key[:2] for key in self.keys} - bounded
 
     def areas(self, found: Overlaps) -> Array:
         """(p, 3) the area vectors of the patches, m², from the second to the first, at the poses now.

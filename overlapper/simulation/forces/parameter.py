@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -42,23 +42,43 @@ class Layers:
         friction: float | OfPair | Literal["distributed"] | None,
         restitution: float | OfPair | None,
         rolling: float | OfPair | None,
+        hardening: float | OfPair | None,
     ) -> None:
         self.distributed = isinstance(friction, str) and friction == "distributed"
         self.recovers = dissipation is None
         if restitution is not None and not self.recovers:
             raise ValueError("restitution must not be given with dissipation, which determines how bodies bounce")
+        if hardening is not None and self.distributed:
+            raise ValueError(
+                "hardening must not be given with friction='distributed', which knows the linear law alone"
+            )
         self._dissipation = Parameter("dissipation", DISSIPATION if dissipation is None else dissipation, "s")
         if stiffness is None and not self.recovers:
             stiffness = STIFFNESS
         # Values that are not given are those of the simulator, or follow from masses and sizes.
         given = {"stiffness": stiffness, "friction": None if self.distributed else friction}
-        given |= {"restitution": restitution, "rolling": rolling}
-        units = {"stiffness": "Pa/m", "rolling": "m"}
+        given |= {"restitution": restitution, "rolling": rolling, "hardening": hardening}
+        units = {"stiffness": "Pa/m", "rolling": "m", "hardening": "1/m"}
         self._given = {
             name: Parameter(name, value, units.get(name, ""), positive=name == "stiffness")  # type: ignore[arg-type]
             for name, value in given.items()
             if value is not None
         }
+
+    def check(self, pairs: Iterable[tuple[LinkKey, LinkKey]], flat: Container[LinkKey]) -> None:
+        """Raise a ValueError if one of these pairs of links has a hardening, and neither link is `flat`.
+
+        The shapes of flat links are half-spaces.
+        """
+        hardening = self._given.get("hardening")
+        if hardening is None:
+            return
+        for a, b in pairs:
+            if a not in flat and b not in flat and hardening.of_links(a, b) > 0:
+                raise ValueError(
+                    f"hardening must be 0 between {a} and {b}, as neither is a half-space, whose patches are flat; "
+                    "it may be a function of the pair"
+                )
 
     def of(self, pairs: NDArray[np.int64], dynamics: Dynamics, sizes: Array) -> dict[str, Array]:
         """Return the laws of each pair (p,), by the names of the arguments of `ContactSolver.place`.
@@ -107,12 +127,15 @@ class Parameter:
         return np.array([self._of_pair(a, b) for a, b in pairs.tolist()], dtype=float)
 
     def _of_pair(self, a: int, b: int) -> float:
-        assert self._function is not None
         if (a, b) not in self._known:
-            first, second = self._links[a], self._links[b]
-            of = f" of {first} and {second}"
-            self._known[a, b] = self._checked(self._function(first, second), of)
+            self._known[a, b] = self.of_links(self._links[a], self._links[b])
         return self._known[a, b]
+
+    def of_links(self, first: LinkKey, second: LinkKey) -> float:
+        """The value for two links."""
+        if self._function is None:
+            return self._number
+        return self._checked(self._function(first, second), f" of {first} and {second}")
 
     def _checked(self, given: Any, of: str) -> float:
         least = "greater than 0" if self._positive else "0 or greater"

@@ -79,8 +79,8 @@ function measured(sighting) {
 // The forces of a sighting; null if the film has none for it.
 function pressOf(sighting) {
   if (!film.forces) return null;
-  const [x, y, z, torque, energy, slip, u, v, w, stiffness] = Array.from({length: 10}, (_, k) => film.presses[k * count + sighting]);
-  return stiffness ? {force: [x, y, z], torque, energy, slip, normal: [u, v, w], stiffness} : null;
+  const [x, y, z, torque, energy, slip, u, v, w, stiffness, hardening] = Array.from({length: 11}, (_, k) => film.presses[k * count + sighting]);
+  return stiffness ? {force: [x, y, z], torque, energy, slip, normal: [u, v, w], stiffness, hardening} : null;
 }
 
 function extent(sighting) {

@@ -8,7 +8,7 @@ function colored(pressure) {
   return ramp[below].map((part, k) => part + (at - below) * (ramp[below + 1][k] - part));
 }
 
-// The pressure at a point about a polytope's middle: stiffness times the polytope's extent along the normal there.
+// The pressure at a point about a polytope's middle: stiffness times the polytope's extent along the normal there, with the hardening.
 function pressureIn(sighting, polytope) {
   const press = pressOf(sighting), total = film.owners.length, planes = [];
   const unit = film.polytope_frame[3 * film.polytope_previous.length + polytope];
@@ -24,7 +24,7 @@ function pressureIn(sighting, polytope) {
       const way = Math.max(-(a * x + b * y + c * z + offset), 0) / Math.abs(slope);
       if (slope > 0) ahead = Math.min(ahead, way); else behind = Math.min(behind, way);
     }
-    return press.stiffness * (ahead + behind);
+    return press.stiffness * (ahead + behind) * (1 + press.hardening * (ahead + behind));
   };
 }
 
