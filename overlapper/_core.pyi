@@ -1675,6 +1675,13 @@ class ContactSolver:
         (p,) the mean depth of each patch in m: its volume over its area, 0 without a patch.
         """
 
+    @property
+    def before(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 6) what the last `solve` took from the step before for each patch: its centroid then in m, the duration of that
+        step in s, and to which part the patch kept its place then and now. All are 0 for patches that were not known then.
+        """
+
     def travel(self, duration: float, velocity: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         How far bodies move within `duration` (s) at this `velocity` of all coordinates.
@@ -1689,7 +1696,7 @@ class ContactSolver:
         `duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.
         """
 
-    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: Sequence[Any] | None = None, motors: numpy.typing.ArrayLike | None = None, constraints: numpy.typing.ArrayLike | None = None) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int, float]:
+    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: Sequence[Any] | None = None, motors: numpy.typing.ArrayLike | None = None, constraints: numpy.typing.ArrayLike | None = None, settled: float = 1e-08) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int, float]:
         """
         The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
         without the patches, the motors and the constraints. Rows that are `damped` choose stability over energy; without the argument, no row

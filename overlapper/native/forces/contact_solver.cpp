@@ -13,10 +13,6 @@
 namespace overlapper {
 namespace {
 
-/// Sweeps end when no slip changes by more than this fraction of the largest slip without forces, or of the largest
-/// change of a sweep.
-constexpr double kSettled = 1e-8;
-
 /// The most visits of patches in a step. The number of sweeps stays between kFewest and kMost.
 constexpr int kVisits = 10000;
 constexpr int kFewest = 10;
@@ -89,9 +85,19 @@ ContactSolver::Six ContactSolver::Row::local(const Screw& of) const {
 
 // ------------------------------------------------------------------------------------------------------------ placing
 
-const ContactSolver::Known* ContactSolver::known(std::int64_t key) const {
-  const auto at = std::ranges::lower_bound(known_, key, {}, &Known::key);
-  return at != known_.end() && at->key == key ? &*at : nullptr;
+const ContactSolver::Known* ContactSolver::find(std::span<const Known> among, std::int64_t key) {
+  const auto at = std::ranges::lower_bound(among, key, {}, &Known::key);
+  return at != among.end() && at->key == key ? &*at : nullptr;
+}
+
+std::vector<ContactSolver::Before> ContactSolver::before() const {
+  std::vector<Before> found;
+  for (const ElasticPatch& patch : patches_) {
+    const Known* last = find(known_before_, patch.key);
+    const Known* now = known(patch.key);
+    found.push_back(last ? Before{last->centroid, last->duration, last->staying, now ? now->staying : 0} : Before{});
+  }
+  return found;
 }
 
 std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vector<ElasticPatch> patches) {
@@ -457,11 +463,14 @@ double ContactSolver::visit(size_t index, Laws& laws, double duration, std::span
   return largest_change(row, laws, change, duration);
 }
 
-/// The largest change of a velocity of a row, in m/s, if its wrench changes so.
+/// The largest change of a velocity of a row, in m/s, if its wrench changes so. Angular velocities of a patch are
+/// multiplied by the mean distance of its points from the centroid: where a body sticks and tips, nothing else changes.
 double ContactSolver::largest_change(const Row& row, const Laws& laws, const Six& change, double duration) const {
   const Six moved = response(row, change);
   if (laws.constraint) return duration * laws.constraint->speed(numbers(moved));
-  return duration * std::max({std::abs(moved.normal[0]), std::abs(moved.tangential[0]), std::abs(moved.tangential[1])});
+  const auto [n, t] = moved;
+  const double turned = std::max({std::abs(n[1]), std::abs(n[2]), std::abs(t[2])}) * row.area.distance;
+  return duration * std::max({std::abs(n[0]), std::abs(t[0]), std::abs(t[1]), turned});
 }
 
 SixNumbers ContactSolver::numbers(const Six& of) {
@@ -854,14 +863,14 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
     }
     ++ended.sweeps;
     largest = std::max(largest, changed);  // bodies may be at rest until they are pushed
-    if (changed <= kSettled * largest) break;
+    if (changed <= step.settled * largest) break;
     if (!small && ended.sweeps >= kAlone && ended.sweeps % 2 == 0 && ended.sweeps + 2 <= most &&
         step.friction == Friction::kEllipsoid)
       extrapolate(momentum, island, laws, duration, velocity);
     if (!small || ended.sweeps < kPlain || ended.sweeps == most || (newton && newton->steps() * unknowns >= kWork))
       continue;
     if (!newton) newton.emplace(*this, island);
-    newton->settle(laws, duration, std::max(kSettled / 10 * largest, kSearched / 10 * changed), velocity);
+    newton->settle(laws, duration, std::max(step.settled / 10 * largest, kSearched / 10 * changed), velocity);
   }
   ended.residual = changed > 0 ? changed / largest : 0;
   return ended;
@@ -1038,6 +1047,7 @@ ContactSolver::Solution ContactSolver::solved(std::span<const Laws> laws, std::s
 }
 
 void ContactSolver::remember(const Solution& solution, std::span<const Laws> laws, double duration) {
+  std::swap(known_, known_before_);
   known_.clear();
   for (size_t i = 0; i < patches_.size(); ++i)
     known_.push_back({patches_[i].key,

@@ -27,6 +27,10 @@ struct PatchForce {
 /// Gauss–Seidel), and all those of bodies that are connected at once (Newton's method) until nothing changes.
 class ContactSolver {
  public:
+  /// Sweeps end when no slip changes by more than this fraction of the largest slip without forces, or of the largest
+  /// change of a sweep.
+  static constexpr double kSettled = 1e-8;
+
   explicit ContactSolver(Multibodies bodies) : bodies_(std::move(bodies)) {}
 
   Multibodies& bodies() { return bodies_; }
@@ -58,6 +62,7 @@ class ContactSolver {
     /// Only of bodies with links.
     std::span<const Motor> motors;
     std::span<const Constraint> constraints;
+    double settled = kSettled;  ///< see kSettled
   };
 
   struct Solution {
@@ -71,6 +76,17 @@ class ContactSolver {
 
   /// Solves a step with the patches as they were placed.
   Solution solve(const Step& step);
+
+  /// What the last solution took from the one before. A patch that was not known then has a duration of 0.
+  struct Before {
+    Vec3 centroid;    ///< m
+    double duration;  ///< s, of that step
+    double staying;   ///< see staying(), then and now
+    double stays;
+  };
+
+  /// For each patch of the last solution.
+  std::vector<Before> before() const;
 
  private:
   /// A force and a torque, or a velocity and an angular velocity, about the same point, in the world.
@@ -203,7 +219,8 @@ class ContactSolver {
     Screw wrench;
     double duration, staying;
   };
-  const Known* known(std::int64_t key) const;
+  static const Known* find(std::span<const Known> among, std::int64_t key);
+  const Known* known(std::int64_t key) const { return find(known_, key); }
 
   /// The same for a constraint.
   struct KnownHeld {
@@ -217,6 +234,7 @@ class ContactSolver {
   std::vector<double> pool_;
   std::vector<Mobility> mobilities_;   ///< per body
   std::vector<Known> known_;           ///< of the last step, sorted by key
+  std::vector<Known> known_before_;    ///< of the step before
   std::vector<KnownHeld> known_held_;  ///< of the last step
   std::vector<signed char> full_;      ///< per coordinate, see MotorsOfBody
 };

@@ -102,15 +102,17 @@ bool has_direction(const Overlaps& found, size_t row, double size) {
 /// Gives a patch pressures that grow faster than the depth below the half-space of its pair.
 void harden(ElasticPatch& patch, double hardening, const Overlaps& found, size_t row) {
   for (int shape : found.pairs[row]) {
-    const HalfSpace* half = std::get_if<HalfSpace>(&(*found.shapes)[shape]);
-    if (!half) continue;
+    const Shape& half = (*found.shapes)[shape];
+    if (bounded(half)) continue;
     const PoseNumbers& p = (*found.poses)[shape];
-    const Pose pose = make_placed(*half, {p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}).pose;
-    const Vec3 normal = pose.rotation * half->plane.normal, out = patch.centroid - pose.translation;
+    const Pose pose = make_placed(half, {p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}).pose;
+    std::vector<Plane> planes;
+    append_planes(half, planes);
+    const Vec3 normal = pose.rotation * planes[0].normal, out = patch.centroid - pose.translation;
     Mat3 spread = found.overlap(row)->inertia();
     const double trace = (spread.row0.x + spread.row1.y + spread.row2.z) / 2;
     spread = {Vec3{trace, 0, 0} - spread.row0, Vec3{0, trace, 0} - spread.row1, Vec3{0, 0, trace} - spread.row2};
-    return patch.harden(hardening, half->plane.offset - dot(normal, out), spread, normal);
+    return patch.harden(hardening, planes[0].offset - dot(normal, out), spread, normal);
   }
   fail("hardening", "must be 0 for pairs without a half-space");
 }
@@ -238,7 +240,7 @@ std::vector<Constraint> to_constraints(nb::handle given, const Multibodies& bodi
 
 nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_given, nb::handle acceleration_given,
                 nb::handle damped_given, bool distributed, nb::handle ahead_given, nb::handle motors_given,
-                nb::handle constraints_given) {
+                nb::handle constraints_given, double settled) {
   const size_t coordinates = solver.bodies().coordinates(), count = solver.patches().size();
   const auto velocity = numbers(velocity_given, "velocity", coordinates);
   const auto acceleration = numbers(acceleration_given, "acceleration", coordinates);
@@ -262,7 +264,8 @@ nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_give
   {
     const nb::gil_scoped_release release;
     solution = solver.solve({duration, velocity, acceleration, damped,
-                             distributed ? Friction::kDistributed : Friction::kEllipsoid, ahead, motors, constraints});
+                             distributed ? Friction::kDistributed : Friction::kEllipsoid, ahead, motors, constraints,
+                             settled});
   }
   std::vector<Vec3> force, torque, slip, normal;
   for (const PatchForce& each : solution.patches)
@@ -399,6 +402,18 @@ answer (p,) is the square of a frequency,
       },
       nb::sig("def depths(self) -> numpy.typing.NDArray[numpy.float64]"),
       "(p,) the mean depth of each patch in m: its volume over its area, 0 without a patch.");
+  cls.def_prop_ro(
+      "before",
+      [](const ContactSolver& self) {
+        std::vector<double> found;
+        for (const auto& [centroid, duration, staying, stays] : self.before())
+          found.insert(found.end(), {centroid.x, centroid.y, centroid.z, duration, staying, stays});
+        const size_t count = found.size() / 6;
+        return nb::cast(to_numpy<Matrix>(std::move(found), {count, 6}), nb::rv_policy::move);
+      },
+      nb::sig("def before(self) -> numpy.typing.NDArray[numpy.float64]"),
+      R"((p, 6) what the last `solve` took from the step before for each patch: its centroid then in m, the duration of that
+step in s, and to which part the patch kept its place then and now. All are 0 for patches that were not known then.)");
   cls.def("travel", &travel, "duration"_a, "velocity"_a,
           nb::sig("def travel(self, duration: float, velocity: numpy.typing.ArrayLike) -> "
                   "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]"),
@@ -417,10 +432,11 @@ rad. (n, 2): the same for the centre of mass of each link in the world.)");
   cls.def(
       "solve", &solve, "duration"_a, "velocity"_a, "acceleration"_a, "damped"_a.none(), "distributed"_a,
       "ahead"_a.none() = nb::none(), "motors"_a.none() = nb::none(), "constraints"_a.none() = nb::none(),
+      "settled"_a = ContactSolver::kSettled,
       nb::sig("def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: "
               "numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike | None, distributed: bool, ahead: "
               "collections.abc.Sequence[typing.Any] | None = None, motors: numpy.typing.ArrayLike | None = None, "
-              "constraints: numpy.typing.ArrayLike | None = None) -> "
+              "constraints: numpy.typing.ArrayLike | None = None, settled: float = 1e-08) -> "
               "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
               "numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], "

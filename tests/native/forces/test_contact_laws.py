@@ -429,3 +429,14 @@ def test_sweeps_of_a_fast_stack_end_sooner_whatever_way_it_slides(direction):
     """Sweeps end when no slip changes by more than a fraction of the largest."""
     velocity = np.concatenate([np.zeros(6), *3 * [[*(1e9 * np.array(direction)), 0, 0, 0]]])
     assert stack(3, velocity=velocity).solve().sweeps <= 3
+
+
+def test_a_cube_that_sticks_and_tips_is_solved_to_the_last_digits():
+    """Its slip is zero from the first visit on, while the torque of the pressures still changes."""
+    links = at_rest(Link(mass=0), Link(mass=1, inertia=(1 / 600,) * 3), positions=[(0, 0, 0), (0, 0, HALF - 1e-3)])
+    drawn = cube_on(links, stiffness=1e6, velocity=[0] * 6 + [1e-3, 0, 0, 0, 0, 0])
+    coarse, fine = (
+        drawn.solver.copy().solve(drawn.duration, drawn.velocity, drawn.acceleration, None, False, settled=settled)[7]
+        for settled in (1e-8, 1e-15)
+    )
+    assert np.abs(coarse - fine).max() < 1e-8 * np.abs(fine).max()
