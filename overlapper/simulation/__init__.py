@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from overlapper.simulation.contacts import Contact, Contacts
     from overlapper.simulation.first_overlaps import FirstOverlap, FirstOverlaps
     from overlapper.simulation.forces.contact import VolumetricContact
+    from overlapper.simulation.forces.derivatives import Kink, StepDerivatives
     from overlapper.simulation.forces.forces import Forces
     from overlapper.simulation.forces.pads import TaxelGrid, Taxels
     from overlapper.simulation.forces.tactile import TactileImage
@@ -44,6 +45,7 @@ __all__ = [
     "FirstOverlap",
     "FirstOverlaps",
     "Forces",
+    "Kink",
     "LinkContact",
     "LinkContacts",
     "NoDirectionWarning",
@@ -53,6 +55,7 @@ __all__ = [
     "SelfCollisionWarning",
     "Skipped",
     "SkippedShapeWarning",
+    "StepDerivatives",
     "SubstepsWarning",
     "Surface",
     "TactileImage",
@@ -84,6 +87,7 @@ __getattr__ = lazily(
         ),
         "first_overlaps": ("FirstOverlap", "FirstOverlaps"),
         "forces.contact": ("VolumetricContact",),
+        "forces.derivatives": ("Kink", "StepDerivatives"),
         "forces.forces": ("Forces",),
         "forces.pads": ("TaxelGrid", "Taxels"),
         "forces.tactile": ("TactileImage",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,17 @@ from numpy.typing import NDArray
 from overlapper._core import ContactSolver
 from overlapper.simulation.layout import Pose
 from overlapper.simulation.model import Array, LinkKey
+
+
+class Links(NamedTuple):
+    """The arguments of `ContactSolver`, a row for each link."""
+
+    parents: Sequence[int]
+    joints: Sequence[int]
+    axes: Array
+    pivots: Array
+    masses: Array
+    inertias: Array
 
 
 class OtherForces(Protocol):
@@ -47,6 +58,9 @@ class Dynamics(Protocol):
     @property
     def version(self) -> int:
         """A number that changes with friction, resistance and weights, at the earliest in `read`."""
+
+    def tree(self) -> Links | None:
+        """The masses and joints of `links`. None if the simulator alone knows them."""
 
     def friction(self, pairs: NDArray[np.int64]) -> Array:
         """(p,) the simulator's coefficients of friction of `pairs` (p, 2), which are pairs of indices in `links`."""

@@ -18,6 +18,7 @@ from overlapper.simulation.bullet.commands import Commands
 from overlapper.simulation.bullet.constraints import constraints
 from overlapper.simulation.bullet.joints import joint_between
 from overlapper.simulation.bullet.other_forces import LearntForces
+from overlapper.simulation.mechanics import Links
 from overlapper.simulation.model import BASE, Array
 
 # By kinematic_tree.Kind: the number that _core.ContactSolver knows it by, and how many coordinates it has.
@@ -156,9 +157,12 @@ class BulletDynamics:
         parents, numbers, axes, pivots = zip(*rows) if rows else ([], [], [], [])
         masses = [mass for mass, _ in self._masses]
         inertias = np.array([inertia for _, inertia in self._masses]).reshape(-1, 3)
-        self.solver = _core.ContactSolver(
-            parents, numbers, np.reshape(axes, (-1, 3)), np.reshape(pivots, (-1, 3)), masses, inertias
-        )
+        where = np.reshape(axes, (-1, 3)), np.reshape(pivots, (-1, 3))
+        self._tree = Links(parents, numbers, *where, np.array(masses), inertias)
+        self.solver = _core.ContactSolver(*self._tree)
+
+    def tree(self) -> Links:
+        return self._tree
 
     def frames(self) -> list[Any]:
         """The inertial frames of the links: tuples of pybullet that begin with position and quaternion."""

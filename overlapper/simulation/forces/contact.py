@@ -11,6 +11,8 @@ from overlapper.simulation.asked_pairs import Among, listed
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.forces.coming import Coming, coming, followed
+from overlapper.simulation.forces.derivatives import StepDerivatives
+from overlapper.simulation.forces.equations import Solved, StepEquations
 from overlapper.simulation.forces.forces import Forces, mean
 from overlapper.simulation.forces.masses import Masses
 from overlapper.simulation.forces.pads import Pad
@@ -181,6 +183,8 @@ class VolumetricContact:
         self._parts: list[tuple[float, Forces]] = []  # of a step, the parts that substeps are, and their forces
         self._told = Told(bodies)
         self._duration = 0.0  # s, of the step
+        self._solved: tuple[float, Array, Array, NDArray[np.bool_] | None, Array] | None = None
+        self._driven = False  # by motors or constraints
         self._model()
         none = np.empty((0, 3))
         undirected, zero = np.empty(0, dtype=bool), np.empty(0)
@@ -271,6 +275,55 @@ class VolumetricContact:
         self._solve(duration / substeps, velocity, frequency2)
         self._tell_of_depth(duration)
         return self._found
+
+    def derivatives(self) -> StepDerivatives:
+        """The derivatives of the last substep, or of `forces()`, by velocities, poses, forces, stiffness and friction.
+
+        They are those of a whole step if it has one substep, as with substeps=1. They exist in pybullet, for free
+        bodies and for bodies with joints.
+
+        Returns
+        -------
+        StepDerivatives
+            Matrices, and the contacts whose laws are not smooth here.
+
+        Raises
+        ------
+        ValueError
+            Before the first step. In MuJoCo, or if there are constraints, motors that a script commands, height fields
+            or `friction="distributed"`.
+        RuntimeError
+            If the solver ended before the forces were settled.
+        """
+        if self._solved is None:
+            raise ValueError("derivatives are those of a step: call step() or forces() first")
+        duration, velocity, acceleration, damped, history = self._solved
+        tree, refused = self._masses.dynamics.tree(), ""
+        if tree is None:
+            refused = "MuJoCo's bodies, whose masses MuJoCo alone knows"
+        elif self._masses.has_tops:
+            refused = "height fields"
+        elif self._layers.distributed:
+            refused = 'friction="distributed"'
+        elif self._driven:
+            refused = "constraints, and motors that a script commands"
+        if tree is None or refused:
+            raise ValueError(f"derivatives are not known for {refused}")
+        masses = self._masses
+        solved = Solved(
+            self._found,
+            duration,
+            velocity,
+            acceleration,
+            damped,
+            self._frames,
+            masses.dynamics.links,
+            tree,
+            masses.of_shapes,
+            masses.laws(self._found.contacts.overlaps),
+            history,
+        )
+        return StepEquations(solved).derivatives()
 
     def mean(self) -> Forces:
         """The overlaps now, with the mean of force and torque over the last step.
@@ -520,6 +573,9 @@ class VolumetricContact:
             self._told.of_substeps(self._contacts, damped, frequency2, duration, planned)
         wrenches: Array
         dynamics = self._masses.dynamics
+        motors = dynamics.motors(duration, duration / self._duration)
+        constraints = dynamics.constraints(duration)
+        self._driven = motors is not None or constraints is not None
         force, torque, slip, normal, directed, wrenches, _, ours, self.sweeps, residual = dynamics.solver.solve(
             duration,
             velocity,
@@ -527,8 +583,8 @@ class VolumetricContact:
             damped,
             self._layers.distributed,
             dynamics.ahead(duration, velocity) if len(self._contacts) else None,
-            dynamics.motors(duration, duration / self._duration),
-            dynamics.constraints(duration),
+            motors,
+            constraints,
         )
         self._found = Forces(
             *(self._contacts, force, torque, slip, normal, directed, self._stiffness),
@@ -538,4 +594,5 @@ class VolumetricContact:
         if not directed.all():
             self._told.of_direction(self._contacts, ~directed)
         self._others.solved(velocity, duration, ours)
+        self._solved = duration, velocity, np.array(other), damped, dynamics.solver.before
         return wrenches

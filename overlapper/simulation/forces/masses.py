@@ -61,6 +61,20 @@ class Masses:
     def are_stale(self) -> bool:
         return self.keys is not self._bodies.keys
 
+    @property
+    def of_shapes(self) -> NDArray[np.int64]:
+        """(k,) the link of each shape, as an index in `dynamics.links`."""
+        return self._links
+
+    @property
+    def has_tops(self) -> bool:
+        """Whether there are prisms of height fields."""
+        return self._tops is not None and bool(np.any(self._tops))
+
+    def laws(self, found: Overlaps) -> dict[str, Array]:
+        """The laws (p,) of each row by name. See `Layers.of`."""
+        return self._of(found).laws
+
     def stiffness(self, found: Overlaps) -> Array:
         """(p,) the stiffness of each row in Pa/m."""
         return self._of(found).laws["stiffness"]

@@ -75,6 +75,9 @@ class MujocoDynamics:
         self.version += 1  # the model is not compared
         return False  # `frames` reads all masses anyway
 
+    def tree(self) -> None:
+        return None
+
     def friction(self, pairs: NDArray[np.int64]) -> Array:
         first, second = self._geoms[pairs].T
         return friction(self._model, first, second)[:, 0]
