@@ -184,6 +184,25 @@ def test_derivatives_are_central_differences(scene, law):
             assert resolved.error(cause) < 1e-6, cause
 
 
+def test_derivatives_in_a_pile_are_central_differences():
+    """Twelve boxes at random, of which some touch without pressure. A step of each cause in eight."""
+    rng = np.random.default_rng(5)
+    with World() as world:
+        for k in range(12):
+            turn = p.getQuaternionFromEuler(rng.uniform(-3, 3, 3))
+            place = [*rng.uniform(-0.06, 0.06, 2), 0.08 + 0.05 * k]
+            world.box(*rng.uniform(0.03, 0.05, 3), position=place, orientation=turn)
+        resolved = Resolved.of(stepping(world, 80, **LAWS["default"]))
+        derived = resolved.derivatives
+        assert len(derived.forces) > 8 and (np.linalg.norm(derived.forces.force, axis=1) == 0).any()
+        assert not derived.kinks
+        for cause in CAUSES:
+            found = getattr(derived, f"velocity_by_{cause}")
+            for which in range(0, found.shape[1], 8):
+                column = resolved.difference(cause, which)[0]
+                assert np.abs(column - found[:, which]).max() < 1e-6 * np.abs(found).max(), (cause, which)
+
+
 def test_derivatives_of_a_bounce_are_central_differences():
     with World() as world:
         resolved = Resolved.of(rebounding(world))

@@ -31,8 +31,7 @@ class Resolved:
 
     def solved(self, cause: str = "", which: int = 0, step: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Velocities (n,) at the end and contacts (p, 6). The stiffness is changed by a part of itself."""
-        masses = self.contact._masses
-        duration, velocity, other, damped, _ = self.contact._solved
+        masses, duration, velocity, other, damped, _ = self.contact._solved
         found = self.contact.last.contacts.overlaps
         frames = [(np.array(frame[0]), np.array(frame[1])) for frame in self.contact._frames]
         laws = {name: np.array(values) for name, values in masses.laws(found).items()}
@@ -64,16 +63,18 @@ class Resolved:
         force, torque, *_, ours, _, _ = solver.solve(duration, velocity, other, damped, False, settled=1e-15)
         return velocity + duration * (other + ours), np.concatenate([force, torque], axis=1)
 
+    def difference(self, cause: str, which: int) -> list[np.ndarray]:
+        """The velocities (n,) and the contacts (p, 6) by one of a cause."""
+        step = CAUSES[cause]
+        ahead, behind = (self.solved(cause, which, sign * step) for sign in (1, -1))
+        width = 2 * step * (self.contact.last.stiffness[which] if cause == "stiffness" else 1)
+        return [(one - two) / width for one, two in zip(ahead, behind)]
+
     def differences(self, cause: str) -> tuple[np.ndarray, np.ndarray]:
         """The velocities (n, m) and the contacts (p, 6, m) by a cause."""
-        step, stiffness = CAUSES[cause], self.contact.last.stiffness
         of_contacts = cause in ("stiffness", "friction")
-        count = len(stiffness) if of_contacts else len(self.derivatives.coordinates)
-        columns = []
-        for which in range(count):
-            ahead, behind = (self.solved(cause, which, sign * step) for sign in (1, -1))
-            width = 2 * step * (stiffness[which] if cause == "stiffness" else 1)
-            columns.append([(one - two) / width for one, two in zip(ahead, behind)])
+        count = len(self.contact.last) if of_contacts else len(self.derivatives.coordinates)
+        columns = [self.difference(cause, which) for which in range(count)]
         return tuple(np.stack(each, axis=-1) for each in zip(*columns))
 
     def error(self, cause: str) -> float:

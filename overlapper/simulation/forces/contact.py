@@ -183,7 +183,7 @@ class VolumetricContact:
         self._parts: list[tuple[float, Forces]] = []  # of a step, the parts that substeps are, and their forces
         self._told = Told(bodies)
         self._duration = 0.0  # s, of the step
-        self._solved: tuple[float, Array, Array, NDArray[np.bool_] | None, Array] | None = None
+        self._solved: tuple[Masses, float, Array, Array, NDArray[np.bool_] | None, Array] | None = None
         self._driven = False  # by motors or constraints
         self._model()
         none = np.empty((0, 3))
@@ -297,11 +297,11 @@ class VolumetricContact:
         """
         if self._solved is None:
             raise ValueError("derivatives are those of a step: call step() or forces() first")
-        duration, velocity, acceleration, damped, history = self._solved
-        tree, refused = self._masses.dynamics.tree(), ""
+        masses, duration, velocity, acceleration, damped, history = self._solved
+        tree, refused = masses.dynamics.tree(), ""
         if tree is None:
             refused = "MuJoCo's bodies, whose masses MuJoCo alone knows"
-        elif self._masses.has_tops:
+        elif masses.has_tops:
             refused = "height fields"
         elif self._layers.distributed:
             refused = 'friction="distributed"'
@@ -309,7 +309,6 @@ class VolumetricContact:
             refused = "constraints, and motors that a script commands"
         if tree is None or refused:
             raise ValueError(f"derivatives are not known for {refused}")
-        masses = self._masses
         solved = Solved(
             self._found,
             duration,
@@ -594,5 +593,5 @@ class VolumetricContact:
         if not directed.all():
             self._told.of_direction(self._contacts, ~directed)
         self._others.solved(velocity, duration, ours)
-        self._solved = duration, velocity, np.array(other), damped, dynamics.solver.before
+        self._solved = self._masses, duration, velocity, np.array(other), damped, dynamics.solver.before
         return wrenches

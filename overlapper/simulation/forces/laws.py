@@ -25,6 +25,9 @@ UNKNOWNS = 8
 # A law at its kink within this share of its scale is reported, as derivatives differ on the two sides.
 KINK = 1e-7
 
+# A smaller share of the scale of a pressure is rounding of an open contact.
+NONE = 1e-12
+
 # Where surfaces turn by less than this share of the speeds of the step, nobody knows where the contact moves.
 STILL = 1e-8
 
@@ -363,7 +366,7 @@ class LinkLaws:
         if find:
             scale = np.abs(given.stiffness[0].real * of.volume[0].real)
             scale = np.maximum(scale, np.abs(response[0, :, 0, 0].real) * f.speed)
-            regimes.pressing = pressure[0, :, 0].real > 0
+            regimes.pressing = pressure[0, :, 0].real > NONE * scale
             self._kink("opening", np.abs(target[0, :, 0].real) < KINK * scale)
             within = f.directed & (asked[0, :, 0].real > 0)
             limit = REACH2 * asked[0, :, 0].real ** 2
