@@ -100,6 +100,11 @@ struct Measures {
   std::vector<Pull> pulls_of_group;  ///< likewise, on more than two
 };
 
+/// A volume by a formula that gives no other measures.
+struct VolumeAlone {
+  double volume = 0, error = 0;  ///< m³
+};
+
 /// Measures, and the inertia. A formula may have no inertia.
 struct MeasuresAndInertia {
   Measures measures;

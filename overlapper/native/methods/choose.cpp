@@ -482,7 +482,15 @@ std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, Vec3 cen
   return patch;
 }
 
-MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
+std::optional<VolumeAlone> volume_alone(const OverlappingBodies& overlapping) {
+  if (!choose(traits(overlapping.bodies)).tries(Way::kClosedForm) || overlapping.bodies.size() != 2)
+    return std::nullopt;
+  return volume_by_surface(overlapping.bodies[0], overlapping.bodies[1]);
+}
+
+namespace {
+
+MeasuresAndInertia all_measures(const OverlappingBodies& overlapping) {
   const Arrangement& at = overlapping.at;
   const auto in_wide_arithmetic = [&] { return !overlapping.traced && overlapping.inside().wide_ball; };
   const bool in_doubt = !overlapping.traced && overlapping.search().inside && in_wide_arithmetic();
@@ -524,6 +532,17 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
   if (!(error_of(kept.measures) <= kept.measures.volume) && in_wide_arithmetic())
     bound_by_ball(overlapping, kept.measures);
   return kept;
+}
+
+}  // namespace
+
+MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
+  MeasuresAndInertia found = all_measures(overlapping);
+  if (const auto& alone = overlapping.volume_alone()) {
+    found.measures.volume = alone->volume, found.measures.volume_error = alone->error;
+    found.measures.way = Way::kClosedForm;
+  }
+  return found;
 }
 
 Region finest_region(const OverlappingBodies& overlapping) {

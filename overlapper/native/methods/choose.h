@@ -67,7 +67,7 @@ inline constexpr std::array<Choice, 9> kChoices{{
      {Way::kSlicing, Way::kDual}},
     {"two, one of them a rounded hull, and no ellipsoid",
      [](const Traits& t) { return t.bodies == 2 && t.rounded && !t.stretched && !t.other; },
-     {Way::kSlicing, Way::kDual}},
+     {Way::kClosedForm, Way::kSlicing, Way::kDual}},
     {"three or more, at least one of them round, and no ellipsoid",
      [](const Traits& t) { return t.bodies > 2 && (t.round || t.rounded) && !t.stretched && !t.other; },
      {Way::kSlicing, Way::kDual}},
@@ -139,7 +139,13 @@ struct OverlappingBodies {
   std::function<const Inside&()> inside;
   std::function<const Region&()> region;                             ///< owners are numbers of `bodies`
   std::function<const std::optional<MeasuresAndInertia>&()> sliced;  ///< areas may be left out
+  std::function<const std::optional<VolumeAlone>&()> volume_alone;
 };
+
+/// The volume of bodies that overlap, by a formula that gives nothing else. No value for bodies without such a formula,
+/// or if its error is more than kEnough of the volume. Otherwise this is the volume of all measures.
+std::optional<VolumeAlone> volume_alone(const OverlappingBodies& overlapping);
+
 /// The most accurate region of bodies that overlap: for polyhedra, with planes placed in double-double. Owners are the
 /// numbers of the bodies as given.
 Region finest_region(const OverlappingBodies& overlapping);

@@ -92,6 +92,13 @@ const std::optional<MeasuresAndInertia>& Overlap::sliced_with_area() const {
   return lazy().sliced_with_area.get([this] { return overlapper::sliced(overlapping_bodies(), true); });
 }
 
+const std::optional<VolumeAlone>& Overlap::volume_alone() const {
+  static const std::optional<VolumeAlone> none;
+  const auto rounded = [](const Placed& body) { return std::holds_alternative<RoundedHull>(body.shape); };
+  if (!pair() || std::ranges::none_of(two_, rounded)) return none;
+  return lazy().volume_alone.get([this] { return overlapper::volume_alone(overlapping_bodies()); });
+}
+
 const MeasuresAndInertia& Overlap::in_full() const {
   return lazy().in_full.get([this] { return measured_in_full(); });
 }
@@ -150,7 +157,8 @@ OverlappingBodies Overlap::overlapping_bodies() const {
           [this]() -> const Search& { return search(); },
           [this]() -> const Inside& { return inside(); },
           [this]() -> const Region& { return region(); },
-          [this]() -> const std::optional<MeasuresAndInertia>& { return sliced(); }};
+          [this]() -> const std::optional<MeasuresAndInertia>& { return sliced(); },
+          [this]() -> const std::optional<VolumeAlone>& { return volume_alone(); }};
 }
 
 MeasuresAndInertia Overlap::measured_in_full() const {
@@ -166,11 +174,14 @@ const Measures& Overlap::measures() const { return measured_at_once() ? *at_once
 
 Way Overlap::way() const {
   if (method_ == Method::kPaper) return Way::kPaper;
-  if (status_ == Status::kOverlapping) return measures().way;
+  if (status_ == Status::kOverlapping) return by_volume_alone() ? Way::kClosedForm : measures().way;
   return at_once_ ? at_once_->way : search().way;
 }
 
-double Overlap::volume() const { return status_ == Status::kOverlapping ? measures().volume : 0; }
+double Overlap::volume() const {
+  if (status_ != Status::kOverlapping) return 0;
+  return by_volume_alone() ? volume_alone()->volume : measures().volume;
+}
 
 double Overlap::volume_error() const {
   if (method_ == Method::kPaper)
@@ -178,7 +189,7 @@ double Overlap::volume_error() const {
   switch (status_) {
     case Status::kSeparated: return 0;
     case Status::kTouching: return touching_volume(bodies(), inside().ball);
-    case Status::kOverlapping: return measures().volume_error;
+    case Status::kOverlapping: return by_volume_alone() ? volume_alone()->error : measures().volume_error;
   }
   return 0;
 }

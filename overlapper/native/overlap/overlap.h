@@ -84,6 +84,7 @@ class Overlap {
   const ContactErrors& contact_errors() const;
 
  private:
+  bool by_volume_alone() const { return method_ == Method::kAuto && !measured_at_once() && volume_alone(); }
   bool traced() const { return at_once_ && at_once_->way == Way::kTracing; }
 
   struct Lazy {
@@ -92,6 +93,7 @@ class Overlap {
     Once<Inside> inside;
     Once<Region> region;
     Once<std::optional<MeasuresAndInertia>> sliced, sliced_with_area;
+    Once<std::optional<VolumeAlone>> volume_alone;
     Once<MeasuresAndInertia> in_full;
     Once<Boundary> boundary;
     Once<Patch> patch;
@@ -110,6 +112,7 @@ class Overlap {
   const Inside& inside() const;
   const std::optional<MeasuresAndInertia>& sliced() const;
   const std::optional<MeasuresAndInertia>& sliced_with_area() const;
+  const std::optional<VolumeAlone>& volume_alone() const;
   const MeasuresAndInertia& in_full() const;
   Region region_of_overlap() const;
   Patch patch_of_overlap(const std::optional<Vec3>& direction) const;

@@ -1,0 +1,60 @@
+#include "shapes/offset_surface.h"
+
+#include <cmath>
+
+#include "geometry/constants.h"
+#include "shapes/hull.h"
+
+namespace overlapper {
+
+double OffsetSurface::volume(double radius) const {
+  return core_volume + radius * (area + radius * (mean_width + radius * (4.0 / 3.0) * kPi));
+}
+
+OffsetSurface offset_surface(const Hull& core) {
+  const HullData& hull = *core.data;
+  OffsetSurface surface;
+  surface.exact = core.unexact() == 0;
+  surface.core_volume = hull.volume;
+  surface.facets.resize(hull.planes.size()), surface.edges.resize(hull.edges.size());
+  surface.vertices.assign(hull.vertices.size(), {{}, 2 * kPi});
+  for (int f = 0; f < static_cast<int>(surface.facets.size()); ++f) {
+    OffsetSurface::Facet& facet = surface.facets[f];
+    facet.normal = rounded(core.plane_through_corners(f).normal);
+    const auto ring = hull.facet(f);
+    const size_t n = ring.size();
+    for (size_t i = 0; i < n; ++i) {
+      const Vec3 at = hull.vertices[ring[i]];
+      const Vec3 before = hull.vertices[ring[(i + n - 1) % n]] - at, after = hull.vertices[ring[(i + 1) % n]] - at;
+      const double sine = norm(cross(after, before));
+      surface.vertices[ring[i]].solid_angle -= std::atan2(sine, dot(after, before));
+      if (i > 0 && i + 1 < n) {
+        const Vec3 apex = hull.vertices[ring[0]];
+        facet.area += norm(cross(at - apex, hull.vertices[ring[i + 1]] - apex)) / 2;
+      }
+    }
+    surface.area += facet.area;
+  }
+  for (size_t e = 0; e < surface.edges.size(); ++e) {
+    const Edge& given = hull.edges[e];
+    OffsetSurface::Edge& edge = surface.edges[e];
+    edge.from = given.from, edge.to = given.to, edge.left = given.left, edge.right = given.right;
+    const Vec3 way = hull.vertices[given.to] - hull.vertices[given.from];
+    edge.length = norm(way), edge.along = unit(way);
+    const Vec3 left = surface.facets[given.left].normal, right = surface.facets[given.right].normal;
+    const double sine = dot(cross(left, right), edge.along);
+    if (!(sine > 0)) surface.exact = false;
+    edge.angle = std::atan2(sine, dot(left, right));
+    edge.middle = unit(left + right), edge.across = cross(edge.along, edge.middle);
+    edge.chord = 2 * std::sin(edge.angle / 2);
+    edge.of_middle = (edge.angle + std::sin(edge.angle)) / 2, edge.of_across = (edge.angle - std::sin(edge.angle)) / 2;
+    surface.mean_width += edge.length * edge.angle / 2;
+    // By the theorem of Gauss over the cone of normals: the arc of an edge lies across the edge.
+    const Vec3 half = edge.angle / 2 * edge.along;
+    surface.vertices[edge.from].normals -= half;
+    surface.vertices[edge.to].normals += half;
+  }
+  return surface;
+}
+
+}  // namespace overlapper

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <vector>
+
+#include "geometry/vec.h"
+
+namespace overlapper {
+
+struct Hull;
+
+/// The surface of a rounded hull by features of its core: a moved facet, a band of a cylinder along each edge, a part
+/// of a sphere at each vertex. The numbers do not depend on the radius. Normals are rounded from double-doubles.
+struct OffsetSurface {
+  struct Facet {
+    Vec3 normal;      ///< unit
+    double area = 0;  ///< m²
+  };
+  /// The normals over an edge turn from the left facet's normal to the right facet's, by `angle` about `along`.
+  struct Edge {
+    int from = 0, to = 0, left = 0, right = 0;
+    double length = 0;
+    Vec3 along;            ///< unit, from `from` to `to`
+    Vec3 middle, across;   ///< the normal in the middle, and `along` × `middle`; unit
+    double angle = 0;      ///< rad
+    double chord = 0;      ///< ∫ n is this times `middle`
+    double of_middle = 0;  ///< ∫ n nᵀ is this times middle middleᵀ ...
+    double of_across = 0;  ///< ... and this times across acrossᵀ
+  };
+  /// The normals at a vertex.
+  struct Vertex {
+    Vec3 normals;  ///< ∫ n over the solid angle
+    double solid_angle = 0;
+  };
+  std::vector<Facet> facets;
+  std::vector<Edge> edges;
+  std::vector<Vertex> vertices;
+  double core_volume = 0, area = 0, mean_width = 0;  ///< Steiner: the volume is V + area r + mean_width r² + 4/3 π r³
+  bool exact = false;  ///< exact numbers give every facet, and no two facets turn inwards at their edge
+
+  double volume(double radius) const;
+};
+
+OffsetSurface offset_surface(const Hull& core);
+
+}  // namespace overlapper
