@@ -1,6 +1,7 @@
 #include "shapes/offset_surface.h"
 
 #include <cmath>
+#include <utility>
 
 #include "geometry/constants.h"
 #include "shapes/hull.h"
@@ -54,6 +55,14 @@ OffsetSurface offset_surface(const Hull& core) {
     surface.vertices[edge.from].normals -= half;
     surface.vertices[edge.to].normals += half;
   }
+  surface.first_edge.assign(surface.vertices.size() + 1, 0);
+  for (const Edge& edge : hull.edges) ++surface.first_edge[edge.from], ++surface.first_edge[edge.to];
+  int before = 0;
+  for (int& count : surface.first_edge) before += std::exchange(count, before);
+  surface.edges_by_vertex.resize(before);
+  std::vector<int> next(surface.first_edge);
+  for (int e = 0; e < static_cast<int>(hull.edges.size()); ++e)
+    for (const int v : {hull.edges[e].from, hull.edges[e].to}) surface.edges_by_vertex[next[v]++] = e;
   return surface;
 }
 

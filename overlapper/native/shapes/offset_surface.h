@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "geometry/vec.h"
@@ -34,6 +35,10 @@ struct OffsetSurface {
   std::vector<Facet> facets;
   std::vector<Edge> edges;
   std::vector<Vertex> vertices;
+  std::span<const int> edges_at(int vertex) const {
+    return std::span(edges_by_vertex).subspan(first_edge[vertex], first_edge[vertex + 1] - first_edge[vertex]);
+  }
+  std::vector<int> edges_by_vertex, first_edge;
   double core_volume = 0, area = 0, mean_width = 0;  ///< Steiner: the volume is V + area r + mean_width r² + 4/3 π r³
   bool exact = false;  ///< exact numbers give every facet, and no two facets turn inwards at their edge
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "geometry/rounding.h"
-#include "methods/round/offset/below_plane.h"
+#include "methods/round/offset/in_polytope.h"
 
 namespace overlapper {
 namespace {
@@ -52,9 +52,8 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
 std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b) {
   const bool first = std::holds_alternative<RoundedHull>(a.shape);
   const Placed &rounded = first ? a : b, &other = first ? b : a;
-  if (!std::holds_alternative<RoundedHull>(rounded.shape) || !std::holds_alternative<HalfSpace>(other.shape))
-    return std::nullopt;
-  return offset::volume_below_plane(rounded, other);
+  if (!std::holds_alternative<RoundedHull>(rounded.shape) || smooth(other.shape)) return std::nullopt;
+  return offset::volume_in_polytope(rounded, other);
 }
 
 std::optional<pieces::RoundMeasures> measure_by_slices(const pieces::SlicedPair& pair) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "geometry/constants.h"
@@ -10,7 +11,6 @@
 #include "geometry/scratch.h"
 #include "geometry/wide_pose.h"
 #include "methods/round/slicing/rules.h"
-#include "shapes/half_space.h"
 #include "shapes/rounded_hull.h"
 
 namespace overlapper::offset {
@@ -21,24 +21,22 @@ constexpr double kTilt = 16 * kUnit;
 /// Rounding of a term, relative to its size. No term takes more than 60 operations that each may round.
 constexpr double kOfTerms = 64 * kUnit;
 
-/// The half-space in the coordinates of the core, exactly.
+/// The plane in the coordinates of the core, in double-double.
 class ExactPlane {
  public:
-  ExactPlane(const Placed& hull, const Placed& half_space) {
-    const HalfSpace& own = std::get<HalfSpace>(half_space.shape);
-    const WidePlane given = *own.unit_facet(0);
-    const Vec3 origin = data_origin(hull.shape);
+  ExactPlane(const WidePlane& given, const Placed& flat, const Placed& hull) {
+    const Vec3 origin = data_origin(hull.shape), origin_of_flat = data_origin(flat.shape);
     WideVector normal = given.normal;
-    if (!unturned(half_space.orientation)) normal = wide_rotation(half_space.orientation) * normal;
-    const WideVector apart = wide(half_space.position) - wide(hull.position);
-    offset_ = given.offset + dot(normal, apart);
+    if (!unturned(flat.orientation)) normal = wide_rotation(flat.orientation) * normal;
+    const WideVector apart = wide(flat.position) - wide(hull.position);
+    offset_ = given.offset + dot(given.normal, wide(origin_of_flat)) + dot(normal, apart);
     const bool turned = !unturned(hull.orientation);
     if (turned) normal = apply_transposed(wide_rotation(hull.orientation), normal);
     normal_ = normal;
     offset_ = offset_ - dot(normal, wide(origin));
-    const double size = std::abs(given.offset.head) + norm(half_space.position) + norm(hull.position) + norm(origin) +
-                        reach(hull.shape);
-    rounding = wide_placing(size, turned || !unturned(half_space.orientation));
+    const double size = std::abs(given.offset.head) + norm(flat.position) + norm(hull.position) + norm(origin) +
+                        norm(origin_of_flat) + reach(hull.shape);
+    rounding = wide_placing(size, turned || !unturned(flat.orientation));
   }
   DoubleDouble height(Vec3 point) const { return dot(normal_, wide(point)) - offset_; }
   Vec3 normal() const { return rounded(normal_); }
@@ -52,8 +50,9 @@ class ExactPlane {
 
 /// What a vertex has of the sums over its edges.
 struct Corner {
-  double height = 0;  ///< m, above the plane
-  double depth = 0;   ///< m, of the ball around the vertex
+  double height = 0;   ///< m, above the plane
+  double depth = 0;    ///< m, of the ball around the vertex
+  bool exact = false;  ///< these come from double-doubles
   // Of the arcs between the normals of its facets, as far as they are below the plane.
   double arcs = 0, size = 0;
   double turned = 0;      ///< angle about the plane's normal
@@ -362,16 +361,17 @@ class BelowPlane {
 
 }  // namespace
 
-std::optional<VolumeAlone> volume_below_plane(const Placed& rounded_hull, const Placed& half_space) {
+std::optional<VolumeAlone> volume_below_plane(const Placed& rounded_hull, const Placed& flat, int facet) {
   const RoundedHull& own = std::get<RoundedHull>(rounded_hull.shape);
   const OffsetSurface& surface = own.surface();
-  if (!surface.exact) return std::nullopt;
+  const std::optional<WidePlane> exact = unit_facet(flat.shape, facet);
+  if (!surface.exact || !exact) return std::nullopt;
   const HullData& hull = *own.core.data;
   const double r = own.radius;
-  const Plane plane = half_space.pose * std::get<HalfSpace>(half_space.shape).plane;
+  const Plane plane = flat.pose * overlapper::facet(flat.shape, facet);
   Vec3 normal = apply_transposed(rounded_hull.pose.rotation, plane.normal);
   const double offset = -signed_distance(plane, rounded_hull.pose.translation);
-  double off = rounding(std::abs(plane.offset) + norm(half_space.pose.translation) +
+  double off = rounding(std::abs(plane.offset) + norm(flat.pose.translation) + reach(flat.shape) +
                         norm(rounded_hull.pose.translation) + reach(rounded_hull.shape));
   const Scratch<Work> work;
   work->corners.assign(hull.vertices.size(), {});
@@ -389,15 +389,18 @@ std::optional<VolumeAlone> volume_below_plane(const Placed& rounded_hull, const 
   if (off < kSure * (r - lowest)) {
     for (Corner& corner : work->corners) corner.height *= side, corner.depth = r - corner.height;
   } else {
-    const ExactPlane exactly(rounded_hull, half_space);
+    const ExactPlane exactly(*exact, flat, rounded_hull);
     normal = exactly.normal();
-    for (size_t v = 0; v < hull.vertices.size(); ++v) {
+    for (Corner& corner : work->corners) corner.height *= side, corner.depth = r - corner.height;
+    const auto place = [&](int v) {
       Corner& corner = work->corners[v];
-      corner.height *= side, corner.depth = r - corner.height;
-      if (corner.depth < -off) continue;
+      if (std::exchange(corner.exact, true)) return;
       const DoubleDouble height = DoubleDouble{side} * exactly.height(hull.vertices[v]);
       corner.height = height.head, corner.depth = (DoubleDouble{r} - height).head;
-    }
+    };
+    for (const OffsetSurface::Edge& edge : surface.edges)
+      if (std::max(work->corners[edge.from].depth, work->corners[edge.to].depth) >= -off)
+        place(edge.from), place(edge.to);
     off = exactly.rounding;
   }
   BelowPlane part(surface, hull, r, side * normal, *work);
