@@ -221,6 +221,14 @@ bool cores_reach(const Placed& a, const Placed& b, const Distance& d, double rea
   return core_radius(a.shape) + core_radius(b.shape) > 0 && norm2(d.normal) > 0 && -d.distance > doubt(reach);
 }
 
+/// True if a rounded hull certainly overlaps a flat body because their cores do, beyond the doubt with the radius.
+bool cores_overlap(const Placed& a, const Placed& b, const Distance& d, double reach) {
+  const double radius = core_radius(a.shape) + core_radius(b.shape);
+  const auto rounded = [](const Placed& body) { return std::holds_alternative<RoundedHull>(body.shape); };
+  const bool fits = (rounded(a) && !smooth(b.shape)) || (rounded(b) && !smooth(a.shape));
+  return fits && d.overlap > 0 && d.overlap + radius > doubt(reach);
+}
+
 /// True if the bodies certainly overlap because an ellipsoid holds a point of the flat body, with interior points of
 /// that body nearby. The witness points of bodies without a gap are points of both, but for rounding.
 bool ellipsoid_reaches(const Placed& a, const Placed& b, const Distance& d, double reach) {
@@ -274,7 +282,8 @@ Search search(const Arrangement& at) {
       search.between = point_between(bodies[0], bodies[1], d);
       return search;
     }
-    if (ellipsoid_reaches(bodies[0], bodies[1], d, search.reach)) {
+    if (cores_overlap(bodies[0], bodies[1], d, search.reach) ||
+        ellipsoid_reaches(bodies[0], bodies[1], d, search.reach)) {
       search.status = Status::kOverlapping, search.way = Way::kDual;
       return search;
     }

@@ -613,15 +613,17 @@ std::optional<VolumeAlone> volume_in_polytope(const Placed& rounded_hull, const 
   const double off = rounding(reach(rounded_hull, reach(polytope, size))) + flatness(polytope.shape);
   const std::vector<Vec3>& vertices = rounded.core.data->vertices;
   Bounds own{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}}, other = own;
-  work->heights.clear(), work->sides.assign(vertices.size(), {});
+  work->heights.resize(vertices.size() * work->faces.size()), work->sides.assign(vertices.size(), {});
+  double* height = work->heights.data();
   for (size_t v = 0; v < vertices.size(); ++v) {
     own = {min(own.lower, vertices[v]), max(own.upper, vertices[v])};
-    for (size_t j = 0; j < work->faces.size(); ++j) {
-      const double height = signed_distance(work->faces[j].plane, vertices[v]);
-      work->heights.push_back(height);
-      if (height <= -r) work->sides[v].below |= std::uint64_t{1} << j;
-      if (height >= r) work->sides[v].above |= std::uint64_t{1} << j;
+    std::uint64_t below = 0, above = 0, bit = 1;
+    for (const Face& face : work->faces) {
+      *height = signed_distance(face.plane, vertices[v]);
+      below |= *height <= -r ? bit : 0, above |= *height >= r ? bit : 0;
+      ++height, bit <<= 1;
     }
+    work->sides[v] = {below, above};
   }
   const int cut = only_cut(rounded, 2 * off, *work);
   if (cut == static_cast<int>(work->faces.size())) {
