@@ -26,6 +26,7 @@ struct Face {
   Plane plane;
   Vec3 origin;
   double twice_area = 0;
+  Vec3 open;  ///< m: the sum of all steps along the border, zero if it is closed
 };
 
 /// What of an edge of the polytope is in the rounded hull, as a fraction of the edge.
@@ -81,13 +82,14 @@ double solid_angle(Vec3 a, Vec3 b, Vec3 c) {
 
 class InPolytope {
  public:
-  InPolytope(const RoundedHull& rounded, std::span<const Edge> edges, Vec3 apex, PolytopeWork& work)
+  InPolytope(const RoundedHull& rounded, std::span<const Edge> edges, Vec3 apex, double tie, PolytopeWork& work)
       : rounded_(rounded),
         surface_(rounded.surface()),
         hull_(*rounded.core.data),
         r_(rounded.radius),
         edges_(edges),
         apex_(apex),
+        tie_(tie),
         work_(work),
         faces_(static_cast<int>(work.faces.size())),
         all_(~std::uint64_t{0} >> (kMostFaces - faces_)) {}
@@ -106,27 +108,33 @@ class InPolytope {
   double volume() const { return thrice_ / 3; }
   /// If surfaces may be off by `rounding`. `extent` is the size of the common set.
   double error(double rounding, double extent) const {
-    return rounding * area_ + kRoundingOfTerms * (size_ + coarse_ * extent) + norm(unbalanced_) * extent;
+    double open = 0;
+    for (const Face& face : work_.faces) open += norm(face.open);
+    return rounding * area_ + kRoundingOfTerms * (size_ + coarse_ * extent) +
+           (norm(unbalanced_) + std::max(0.0, open - kRoundingOfTerms * border_) * extent) * extent;
   }
 
  private:
   double height(int v, int j) const { return work_.heights[v * faces_ + j]; }
 
-  /// Collects the planes that cut a feature around some vertices. False if the feature is beyond a plane. `range(j)` is
-  /// the least and the largest height above plane j.
+  enum class Reach { kBeyond, kNear, kUnsure };
+  /// Collects the planes that cut a feature around some vertices. `range(j)` is the least and the largest height above
+  /// plane j. Beyond if the feature is above a plane. Unsure if it may touch one.
   template <class Range>
-  bool find_active(std::span<const int> vertices, Range range) {
+  Reach find_active(std::span<const int> vertices, Range range) {
     work_.active.clear();
     std::uint64_t below = ~std::uint64_t{0}, above = below;
     for (const int v : vertices) below &= work_.sides[v].below, above &= work_.sides[v].above;
-    if (above != 0) return false;
+    if (above != 0) return Reach::kBeyond;
+    bool unsure = false;
     for (std::uint64_t rest = ~below & all_; rest != 0; rest &= rest - 1) {
       const int j = std::countr_zero(rest);
       const auto [least, most] = range(j);
-      if (least >= 0) return false;
+      if (least > tie_) return Reach::kBeyond;
+      unsure = unsure || least > -tie_ || std::abs(most) < tie_;
       if (most > 0) work_.active.push_back(j);
     }
-    return true;
+    return unsure ? Reach::kUnsure : Reach::kNear;
   }
   /// The least and the largest dot(normal, u) over the normals u of an edge.
   static std::pair<double, double> range_over(const OffsetSurface::Edge& edge, Vec3 normal) {
@@ -143,9 +151,10 @@ class InPolytope {
     unbalanced_ += vector, thrice_ += cone;
     size_ += std::abs(cone);
   }
-  /// Adds to the border of a face.
-  void add_border(int j, Vec3 twice) {
+  /// Adds to the border of a face: its step, and twice the area vector that it spans with the face's origin.
+  void add_border(int j, Vec3 step, Vec3 twice) {
     Face& face = work_.faces[j];
+    face.open += step, border_ += std::sqrt(norm2(step));
     const double term = dot(face.plane.normal, twice);
     face.twice_area += term, size_ += std::abs(term) * std::abs(signed_distance(face.plane, apex_));
   }
@@ -156,7 +165,11 @@ class InPolytope {
       const Edge& edge = edges_[e];
       if (!((edge.left == j && edge.right == k) || (edge.left == k && edge.right == j))) continue;
       const Vec3 from = work_.corners[edge.from], way = work_.corners[edge.to] - from;
-      const double fraction = dot(at - from, way) / norm2(way), slope = dot(outward, way);
+      const double length = std::sqrt(norm2(way)), fraction = dot(at - from, way) / (length * length);
+      const double slope = dot(outward, way);
+      // Near a corner of the polytope, or along its edge, other edges may pass on the other side of it.
+      constexpr double kAlong = 1e-9;
+      if (!(std::min(fraction, 1 - fraction) * length > tie_ && std::abs(slope) > kAlong * length)) return false;
       Ridge& ridge = work_.ridges[e];
       if (slope > 0) {
         if (ridge.leaves) return false;
@@ -181,7 +194,7 @@ class InPolytope {
       const double moved = r_ * dot(facet.normal, work_.faces[j].plane.normal);
       return std::pair(least + moved, most + moved);
     };
-    if (!find_active(ring, range)) return true;
+    if (const Reach reached = find_active(ring, range); reached != Reach::kNear) return reached == Reach::kBeyond;
     const double reach = dot(facet.normal, hull_.vertices[ring[0]] - apex_) + r_;
     if (work_.active.empty()) {
       area_ += facet.area;
@@ -195,6 +208,10 @@ class InPolytope {
       const Plane& plane = work_.faces[j].plane;
       clipped.clear();
       const size_t n = polygon.size();
+      const auto touches = [&](const PolytopeWork::Labelled& corner) {
+        return std::abs(signed_distance(plane, corner.at)) < tie_;
+      };
+      if (std::ranges::any_of(polygon, touches)) return false;
       for (size_t i = 0; i < n; ++i) {
         const PolytopeWork::Labelled here = polygon[i], next = polygon[(i + 1) % n];
         const double above = signed_distance(plane, here.at), then = signed_distance(plane, next.at);
@@ -217,7 +234,7 @@ class InPolytope {
       if (i > 0) twice += cross(here.at - first, next.at - first);
       if (here.plane == kNone) continue;
       const Vec3 origin = work_.faces[here.plane].origin;
-      add_border(here.plane, cross(next.at - origin, here.at - origin));
+      add_border(here.plane, here.at - next.at, cross(next.at - origin, here.at - origin));
       if (before.plane != kNone && !pierce(before.plane, here.plane, here.at, facet.normal)) return false;
     }
     const double area = dot(twice, facet.normal) / 2;
@@ -254,7 +271,7 @@ class InPolytope {
       if (slope < 0) low = std::max(low, one);
     }
     std::erase_if(work_.cuts, [&](const Cut& cut) {
-      return (cut.slope > 0 && cut.first >= high) || (cut.slope < 0 && cut.last <= low);
+      return (cut.slope > 0 && cut.first > high) || (cut.slope < 0 && cut.last < low);
     });
     return low < high;
   }
@@ -265,7 +282,8 @@ class InPolytope {
       const auto [least, most] = range_over(edge, work_.faces[j].plane.normal);
       return std::pair(std::min(from, to) + r_ * least, std::max(from, to) + r_ * most);
     };
-    if (!find_active(std::array{edge.from, edge.to}, range)) return true;
+    const Reach reached = find_active(std::array{edge.from, edge.to}, range);
+    if (reached != Reach::kNear) return reached == Reach::kBeyond;
     const Vec3 a = hull_.vertices[edge.from];
     const Vec3 from_apex = a - apex_;
     if (work_.active.empty()) {
@@ -347,8 +365,8 @@ class InPolytope {
         const Vec3 along_sine = r_ * (edge.across - cut->across / cut->slope * edge.along);
         coarse_ += w.one * norm(centre) * (norm(along_cosine) + norm(along_sine));
         // x' = -sin · along_cosine + cos · along_sine.
-        add_border(cut->plane, side * (cross(centre, w.c * along_sine - w.s * along_cosine) +
-                                       w.one * cross(along_cosine, along_sine)));
+        const Vec3 step = w.c * along_sine - w.s * along_cosine;
+        add_border(cut->plane, side * step, side * (cross(centre, step) + w.one * cross(along_cosine, along_sine)));
       }
     }
     return true;
@@ -378,7 +396,8 @@ class InPolytope {
       }
       return std::pair(height(v, j) + r_ * (lowest ? -1 : least), height(v, j) + r_ * (highest ? 1 : most));
     };
-    if (!find_active(std::array{v}, range)) return true;
+    if (const Reach reached = find_active(std::array{v}, range); reached != Reach::kNear)
+      return reached == Reach::kBeyond;
     const Vec3 from_apex = hull_.vertices[v] - apex_;
     const double square = r_ * r_;
     if (work_.active.empty()) {
@@ -431,8 +450,11 @@ class InPolytope {
       const Vec3 x = any_orthogonal(n);
       const Circle circle{n, x, cross(n, x), level, std::sqrt((1 - level) * (1 + level))};
       work_.breaks.assign({-kPi, -kPi / 3, kPi / 3});
+      bool same = false;
       const auto cut_by = [&](Vec3 normal, double at) {
         const size_t before = work_.breaks.size();
+        const double across = norm2(cross(normal, n)), apart = at - level * dot(normal, n);
+        same = same || (across < 1e-18 && std::abs(apart) < 1e-9);
         add_roots(circle.radius * dot(normal, circle.x), circle.radius * dot(normal, circle.y),
                   at - level * dot(normal, n), kPi);
         return before;
@@ -446,6 +468,7 @@ class InPolytope {
           if (below(u, j, k) && among_normals(u) && !pierce(j, k, hull_.vertices[v] + r_ * u, u)) return false;
         }
       }
+      if (same) return false;
       work_.breaks.push_back(kPi);
       std::ranges::sort(work_.breaks);
       for (size_t i = 0; i + 1 < work_.breaks.size(); ++i) {
@@ -459,7 +482,7 @@ class InPolytope {
         normals += swept / 2;
         angle += solid_angle(pole, u0, u1) + (1 + level) * turned - solid_angle(-n, u0, u1);
         const Vec3 centre = hull_.vertices[v] - work_.faces[j].origin;
-        add_border(j, -r_ * (cross(centre, u1 - u0) + r_ * swept));
+        add_border(j, -r_ * (u1 - u0), -r_ * (cross(centre, u1 - u0) + r_ * swept));
         coarse_ += r_ * turned * (norm(centre) + r_);
       }
     }
@@ -485,7 +508,7 @@ class InPolytope {
       const Vec3 begin = start + ridge.from * way, end = start + ridge.to * way;
       for (const auto& [j, side] : {std::pair(edge.left, 1.0), std::pair(edge.right, -1.0)}) {
         const Vec3 origin = work_.faces[j].origin;
-        add_border(j, side * cross(begin - origin, end - origin));
+        add_border(j, side * (end - begin), side * cross(begin - origin, end - origin));
       }
     }
     for (const Face& face : work_.faces) {
@@ -533,6 +556,7 @@ class InPolytope {
   double r_;
   std::span<const Edge> edges_;
   Vec3 apex_;
+  double tie_;  ///< m: nearer to a plane, nothing is certain
   PolytopeWork& work_;
   int faces_;
   std::uint64_t all_;
@@ -540,6 +564,7 @@ class InPolytope {
   double size_ = 0;    ///< m³: sum of the sizes of all terms
   double coarse_ = 0;  ///< m²: the same of terms that cancel, before they are multiplied by a distance
   double area_ = 0;    ///< m²
+  double border_ = 0;  ///< m: sum of the sizes of all steps along borders
   Vec3 unbalanced_;    ///< m²
 };
 
@@ -551,7 +576,7 @@ bool become(const Placed& rounded_hull, const Placed& polytope, PolytopeWork& wo
   work.corners.clear(), work.faces.clear();
   ask_flat(polytope.shape, [&](const auto& shape) {
     for (int c = 0; c < shape.vertex_count(); ++c) work.corners.push_back(pose * shape.vertex(c));
-    for (int f = 0; f < facets; ++f) work.faces.push_back({pose * shape.facet(f), {}});
+    for (int f = 0; f < facets; ++f) work.faces.push_back({pose * shape.facet(f), {}, 0, {}});
     return true;
   });
   return true;
@@ -611,6 +636,7 @@ std::optional<VolumeAlone> volume_in_polytope(const Placed& rounded_hull, const 
   const double size = norm(rounded_hull.pose.translation - polytope.pose.translation) + reach(rounded_hull.shape) +
                       reach(polytope.shape);
   const double off = rounding(reach(rounded_hull, reach(polytope, size))) + flatness(polytope.shape);
+  const double tie = 4 * off;
   const std::vector<Vec3>& vertices = rounded.core.data->vertices;
   Bounds own{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}}, other = own;
   work->heights.resize(vertices.size() * work->faces.size()), work->sides.assign(vertices.size(), {});
@@ -620,7 +646,7 @@ std::optional<VolumeAlone> volume_in_polytope(const Placed& rounded_hull, const 
     std::uint64_t below = 0, above = 0, bit = 1;
     for (const Face& face : work->faces) {
       *height = signed_distance(face.plane, vertices[v]);
-      below |= *height <= -r ? bit : 0, above |= *height >= r ? bit : 0;
+      below |= *height < -r - tie ? bit : 0, above |= *height > r + tie ? bit : 0;
       ++height, bit <<= 1;
     }
     work->sides[v] = {below, above};
@@ -637,9 +663,8 @@ std::optional<VolumeAlone> volume_in_polytope(const Placed& rounded_hull, const 
   const Vec3 apex = 0.5 * (lower + upper);
   for (Face& face : work->faces) {
     face.origin = apex - signed_distance(face.plane, apex) * face.plane.normal;
-    face.twice_area = 0;
   }
-  InPolytope part(rounded, edges(polytope.shape), apex, *work);
+  InPolytope part(rounded, edges(polytope.shape), apex, tie, *work);
   if (!part.add_all()) return std::nullopt;
   const VolumeAlone found{part.volume(), part.error(off, norm(upper - lower))};
   if (!(found.volume > 0 && found.error <= kEnough * found.volume)) return std::nullopt;
