@@ -406,6 +406,10 @@ class InPolytope {
       return true;
     }
     const Vec3 pole = unit(vertex.normals);
+    // Triangles with a corner opposite to the pole have no certain sign.
+    constexpr double kOpposite = -0.99;
+    for (const int e : edges)
+      if (range_over(surface_.edges[e], pole).first < kOpposite) return false;
     Vec3 normals;
     double angle = 0;
     const auto out_of = [&](int e) {
@@ -480,7 +484,9 @@ class InPolytope {
         const double turned = end - begin;
         const Vec3 swept = level * cross(n, u1 - u0) - circle.radius * circle.radius * turned * n;  // ∫ u × du
         normals += swept / 2;
-        angle += solid_angle(pole, u0, u1) + (1 + level) * turned - solid_angle(-n, u0, u1);
+        // The sector between the arc and the pole of the plane that is nearer, instead of their triangle.
+        const double nearer = level > 0 ? 1 : -1;
+        angle += solid_angle(pole, u0, u1) - nearer * (1 - std::abs(level)) * turned - solid_angle(nearer * n, u0, u1);
         const Vec3 centre = hull_.vertices[v] - work_.faces[j].origin;
         add_border(j, -r_ * (u1 - u0), -r_ * (cross(centre, u1 - u0) + r_ * swept));
         coarse_ += r_ * turned * (norm(centre) + r_);
