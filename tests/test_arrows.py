@@ -30,6 +30,7 @@ APART = ["methods/clipping", "methods/tracing", "methods/dual"]
 ROUND = {
     "closed_forms": ["closed_forms", "quadric"],
     "lenses": ["lenses", "pieces", "slicing", "quadric"],
+    "offset": ["offset", "slicing"],
     "pieces": ["pieces", "slicing", "quadric"],
     "seam": ["seam", "lenses", "pieces", "slicing", "quadric"],
     "slicing": ["slicing", "quadric"],

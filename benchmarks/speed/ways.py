@@ -85,7 +85,7 @@ TYPICAL = {
         "slicing", (WITH_MARGIN,), (WITH_MARGIN, (0.12, 0.07, 0.09), TURN)
     ),
     "a rounded hull of 80 facets and a box": typical(
-        "slicing", (RoundedHull(icosphere(1), 0.05),), (CUBE, (0.9, 0.3, 0.4), TURN)
+        "closed form", (RoundedHull(icosphere(1), 0.05),), (CUBE, (0.9, 0.3, 0.4), TURN)
     ),
     "a box stacked on another, flush, 1 µm deep": typical("wide dual hull", BOX, (CUBE, (0, 0, 1 - 1e-6))),
     "a box resting on another, 1e-14 m deep": typical("wide dual hull", BOX, (CUBE, (0.1, 0.2, 1 - 1e-14), ABOUT_Z)),

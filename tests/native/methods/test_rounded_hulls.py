@@ -1,0 +1,200 @@
+"""Volumes of a rounded hull in a half-space, a box or a hull, by their surfaces.
+
+The references are Steiner's formula, sums over two parts of a body, sections of a rounded box in closed form, and
+certificates.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from overlapper import Box, HalfSpace, Hull, Placed, RoundedHull, overlap
+
+CUBE_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+TURNS = [(0, 0, 0, 1), (0, 0, 1, 1), (1, 1, 1, 1), (0.1, 0.2, 0.3, 0.4), (1e-9, 0, 0, 1)]
+FAR = np.array([1e6, -2e6, 0.5e6])
+
+
+def points(rng, count):
+    rows = rng.normal(size=(count, 3))
+    return rows / np.linalg.norm(rows, axis=1)[:, None] * rng.uniform(0.3, 0.6, 3)
+
+
+def drawn(rng):
+    return RoundedHull(points(rng, rng.choice([4, 8, 20, 60])), 10 ** rng.uniform(-4, -0.7))
+
+
+def flat_body(rng, kind):
+    if kind == "half-space":
+        return Placed(HalfSpace(rng.normal(size=3), rng.normal() * 0.2), rng.normal(size=3) * 0.1, rng.normal(size=4))
+    shape = Box(rng.uniform(0.25, 0.5, 3)) if kind == "box" else Hull(points(rng, 20))
+    return Placed(shape, rng.normal(size=3) * 0.1, rng.normal(size=4))
+
+
+def pair(rng, kind, depth=None, far=None):
+    """An overlapping pair; pulled apart to the depth, if one is given."""
+    while True:
+        a = Placed(drawn(rng), rng.normal(size=3) * 0.3, rng.normal(size=4))
+        b = flat_body(rng, kind)
+        found = overlap(a, b)
+        if found and depth is not None:
+            a = Placed(a.shape, a.position + max(0.0, found.depth - depth) * found.normal, a.orientation)
+            found = overlap(a, b)
+        if found and far is not None:
+            a, b = (Placed(body.shape, body.position + far, body.orientation) for body in (a, b))
+            found = overlap(a, b)
+        if found:
+            return found
+
+
+def section_integral(half, r, height):
+    """m³ of a box of these half extents, rounded by r, below z = height: areas of its sections, integrated."""
+    a, b, c = half
+
+    def beyond(t):  # from the middle of the rounding down to t above it
+        # Area at t: 4 a b + 4 (a + b) s + π s², with s² = r² - t².
+        chord = (t * math.sqrt(r * r - t * t) + r * r * math.asin(t / r)) / 2
+        return 4 * a * b * t + 4 * (a + b) * chord + math.pi * (r * r * t - t**3 / 3)
+
+    full = 4 * a * b + 4 * (a + b) * r + math.pi * r * r
+    low = beyond(min(max(height + c, -r), 0.0)) - beyond(-r)
+    middle = full * (min(max(height, -c), c) + c)
+    return low + middle + beyond(min(max(height - c, 0.0), r))
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("r", [1e-3, 0.0625, 0.25])
+@pytest.mark.parametrize("far", [np.zeros(3), FAR])
+def test_a_rounded_box_below_planes_along_its_faces_is_the_integral_of_its_sections(turn, r, far):
+    half = np.array([0.5, 0.25, 0.125])
+    body = Placed(RoundedHull(CUBE_CORNERS * half, r), far, turn)
+    for height in (-0.125 - r / 2, -0.125, -0.125 + r / 3, 0.0, 0.1, 0.125, 0.125 + r / 2):
+        found = overlap(body, Placed(HalfSpace([0, 0, 1], height), far, turn))
+        expected = section_integral(half, r, height)
+        assert found.way == "closed form"
+        assert abs(found.volume - expected) <= found.volume_error + 1e-14 * expected
+
+
+@pytest.mark.parametrize("depth", [1e-3, 1e-5, 1e-7])
+def test_a_face_on_a_plane_keeps_its_digits_at_any_depth(depth):
+    half, r = np.array([0.5, 0.25, 0.125]), 0.0625
+    body = RoundedHull(CUBE_CORNERS * half, r)
+    found = overlap(body, HalfSpace([0, 0, 1], -0.125 - r + depth))
+    d = (-0.125 - r + depth) + (0.125 + r)  # the doubles' own depth
+    s = r - d
+    # Below t = -s of the rounding, from cap, side and face, without terms that cancel.
+    angle = math.acos(s / r)
+    chord = (r * r * angle - s * math.sqrt(d * (2 * r - d))) / 2
+    expected = 4 * 0.5 * 0.25 * d + 4 * 0.75 * chord + math.pi * d * d * (r - d / 3)
+    assert found.volume == pytest.approx(expected, rel=2e-9 if depth < 1e-6 else 1e-10)
+    lower, upper = found.certificate().verify()
+    assert float(lower) - found.volume_error <= found.volume <= float(upper) + found.volume_error
+
+
+@pytest.mark.parametrize("kind", ["box", "hull"])
+def test_a_body_wholly_inside_has_steiners_volume(kind):
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        body = drawn(rng)
+        shape = Box([2, 2, 2]) if kind == "box" else Hull(CUBE_CORNERS * 2)
+        found = overlap(Placed(body, rng.normal(size=3) * 0.1, rng.normal(size=4)), Placed(shape, (0, 0, 0)))
+        assert found.way == "closed form"
+        assert found.volume == pytest.approx(body.volume, rel=1e-14)
+
+
+def test_the_parts_on_both_sides_of_a_plane_add_up():
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        body = Placed(drawn(rng), rng.normal(size=3), rng.normal(size=4))
+        normal = rng.normal(size=3)
+        offset = body.position @ normal + rng.normal() * 0.2 * np.linalg.norm(normal)
+        sides = overlap(body, HalfSpace(normal, offset)), overlap(body, HalfSpace(-normal, -offset))
+        total = sum(side.volume for side in sides)
+        error = sum(side.volume_error for side in sides) + 1e-14 * body.shape.volume
+        assert abs(total - body.shape.volume) <= error
+
+
+@pytest.mark.parametrize("kind", ["box", "hull"])
+def test_the_parts_of_a_cut_body_add_up(kind):
+    rng = np.random.default_rng(3)
+    ways = []
+    for _ in range(60):
+        body = Placed(drawn(rng), rng.normal(size=3) * 0.3, rng.normal(size=4))
+        turn, at, half = rng.normal(size=4), rng.normal(size=3) * 0.1, rng.uniform(0.25, 0.5, 3)
+        if kind == "box":
+            cut = rng.uniform(-0.8, 0.8) * half[0]
+            corners = CUBE_CORNERS * half
+            parts = [corners.copy(), corners.copy()]
+            for part, side in zip(parts, (1, -1)):
+                part[CUBE_CORNERS[:, 0] == side, 0] = cut
+            whole, halves = Box(half), [Hull(part) for part in parts]
+        else:
+            # A pyramid on each side of a rectangle.
+            base = np.array([[-1, -1, 0], [-1, 1, 0], [1, -1, 0], [1, 1, 0]]) * half
+            up, down = [0.1, 0.05, half[2]], [0.1, 0.05, -half[2]]
+            halves = [Hull([*base, up]), Hull([*base, down])]
+            whole = Hull([*base, up, down])
+        found = [overlap(body, Placed(shape, at, turn)) for shape in (whole, *halves)]
+        ways += [one.way for one in found if one]
+        error = sum(one.volume_error for one in found) + 1e-14
+        assert abs(found[0].volume - found[1].volume - found[2].volume) <= error
+    assert ways.count("closed form") > len(ways) / 2
+
+
+@pytest.mark.parametrize("kind", ["half-space", "box", "hull"])
+@pytest.mark.parametrize("far", [None, FAR])
+def test_stated_errors_hold_against_certificates(kind, far):
+    rng = np.random.default_rng(4)
+    for number in range(12):
+        depth = None if number % 2 else 10 ** -rng.uniform(1, 6)
+        found = pair(rng, kind, depth, far)
+        lower, upper = found.certificate().verify()
+        assert float(lower) - found.volume_error <= found.volume <= float(upper) + found.volume_error
+
+
+def test_stated_errors_hold_below_a_plane_far_from_its_origin():
+    rng = np.random.default_rng(8)
+    for number in range(12):
+        normal = np.array([3.0, 2.0, 1.0]) if number % 2 else rng.normal(size=3)
+        body = Placed(drawn(rng), normal / np.linalg.norm(normal) * 1e6, rng.normal(size=4))
+        offset = float(body.position @ normal) + 0.2 * rng.normal() * np.linalg.norm(normal)
+        found = overlap(body, HalfSpace(normal, offset))
+        if found:
+            shallow = overlap(body, HalfSpace(normal, offset - (found.depth - 1e-4) * np.linalg.norm(normal)))
+            for one in (found, shallow):
+                lower, upper = one.certificate().verify()
+                assert float(lower) - one.volume_error <= one.volume <= float(upper) + one.volume_error
+
+
+@pytest.mark.parametrize("kind", ["half-space", "box", "hull"])
+def test_deep_contacts_have_a_closed_form(kind):
+    rng = np.random.default_rng(5)
+    deep = [found for found in (pair(rng, kind) for _ in range(60)) if found.depth > 0.1]
+    assert len(deep) > 20
+    assert {found.way for found in deep} == {"closed form"}
+    assert all(found.volume_error <= 1e-12 * found.volume for found in deep)
+
+
+def test_aligned_and_flush_bodies_agree_with_certificates():
+    r = 0.0625
+    body = RoundedHull(CUBE_CORNERS * [0.5, 0.25, 0.125], r)
+    for at in ([0, 0, 0.5], [0.5, 0.25, 0.125], [0.75, 0, 0], [0.5 + r, 0, 0], [0.3, 0.2, 0.1], [0, 0, 0]):
+        for turn in TURNS:
+            for box in (Box([0.5, 0.5, 0.5]), Box([0.5, 0.25, 0.3]), Box([0.5 + r, 0.25 + r, 0.125 + r])):
+                found = overlap(Placed(body, at, turn), Placed(box, (0, 0, 0)))
+                if not found:
+                    continue
+                lower, upper = found.certificate().verify()
+                assert float(lower) - found.volume_error <= found.volume <= float(upper) + found.volume_error
+
+
+def test_other_measures_agree_with_the_volume():
+    rng = np.random.default_rng(6)
+    for kind in ("half-space", "box", "hull"):
+        first, then = (pair(np.random.default_rng(7), kind) for _ in range(2))
+        volume = first.volume
+        assert then.centroid.shape == (3,)
+        assert (then.volume, then.volume_error, then.way) == (volume, first.volume_error, first.way)
+        found = pair(rng, kind)
+        assert found.errors.volume == found.volume_error
