@@ -224,8 +224,7 @@ bool cores_reach(const Placed& a, const Placed& b, const Distance& d, double rea
 /// True if a rounded hull certainly overlaps a flat body because their cores do, beyond the doubt with the radius.
 bool cores_overlap(const Placed& a, const Placed& b, const Distance& d, double reach) {
   const double radius = core_radius(a.shape) + core_radius(b.shape);
-  const auto rounded = [](const Placed& body) { return std::holds_alternative<RoundedHull>(body.shape); };
-  const bool fits = (rounded(a) && !smooth(b.shape)) || (rounded(b) && !smooth(a.shape));
+  const bool fits = (rounded_hull(a.shape) && !smooth(b.shape)) || (rounded_hull(b.shape) && !smooth(a.shape));
   return fits && d.overlap > 0 && d.overlap + radius > doubt(reach);
 }
 

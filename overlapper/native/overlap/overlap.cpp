@@ -94,7 +94,7 @@ const std::optional<MeasuresAndInertia>& Overlap::sliced_with_area() const {
 
 const std::optional<VolumeAlone>& Overlap::volume_alone() const {
   static const std::optional<VolumeAlone> none;
-  const auto rounded = [](const Placed& body) { return std::holds_alternative<RoundedHull>(body.shape); };
+  const auto rounded = [](const Placed& body) { return rounded_hull(body.shape); };
   if (!pair() || std::ranges::none_of(two_, rounded)) return none;
   return lazy().volume_alone.get([this] { return overlapper::volume_alone(overlapping_bodies()); });
 }

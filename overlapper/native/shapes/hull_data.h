@@ -8,6 +8,7 @@
 #include "geometry/vec.h"
 #include "shapes/choices.h"
 #include "shapes/hull_graph.h"
+#include "shapes/offset_surface.h"
 
 namespace overlapper {
 
@@ -33,6 +34,8 @@ struct HullData {
   std::vector<std::array<int, 3>> facets_meet;  ///< per vertex: three of its facets with well-spread normals
   double radius = 0;                            ///< of a ball about the coordinates' origin that holds all vertices
   double flatness = 0;  ///< m: most that vertices of a facet lie inside its plane, or neighbouring vertices outside
+
+  KeptOffsetSurface offset_surface;  ///< of the hull grown by any radius
 
   std::span<const int> facet(int f) const {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);

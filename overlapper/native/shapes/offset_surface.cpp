@@ -1,10 +1,12 @@
 #include "shapes/offset_surface.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "geometry/constants.h"
-#include "shapes/hull.h"
+#include "geometry/wide.h"
+#include "shapes/hull_data.h"
 
 namespace overlapper {
 
@@ -12,16 +14,19 @@ double OffsetSurface::volume(double radius) const {
   return core_volume + radius * (area + radius * (mean_width + radius * (4.0 / 3.0) * kPi));
 }
 
-OffsetSurface offset_surface(const Hull& core) {
-  const HullData& hull = *core.data;
+namespace {
+
+OffsetSurface measured(const HullData& hull) {
   OffsetSurface surface;
-  surface.exact = core.unexact() == 0;
+  surface.exact = std::ranges::none_of(hull.facet_corners, [](const auto& corners) { return corners[0] < 0; });
   surface.core_volume = hull.volume;
   surface.facets.resize(hull.planes.size()), surface.edges.resize(hull.edges.size());
   surface.vertices.assign(hull.vertices.size(), {{}, 2 * kPi});
   for (int f = 0; f < static_cast<int>(surface.facets.size()); ++f) {
     OffsetSurface::Facet& facet = surface.facets[f];
-    facet.normal = rounded(core.plane_through_corners(f).normal);
+    const auto [a, b, c] = hull.facet_corners[f];
+    facet.normal =
+        a < 0 ? hull.planes[f].normal : rounded(unit(wide_normal(hull.corners[a], hull.corners[b], hull.corners[c])));
     const auto ring = hull.facet(f);
     const size_t n = ring.size();
     for (size_t i = 0; i < n; ++i) {
@@ -64,6 +69,12 @@ OffsetSurface offset_surface(const Hull& core) {
   for (int e = 0; e < static_cast<int>(hull.edges.size()); ++e)
     for (const int v : {hull.edges[e].from, hull.edges[e].to}) surface.edges_by_vertex[next[v]++] = e;
   return surface;
+}
+
+}  // namespace
+
+const OffsetSurface& offset_surface(const HullData& core) {
+  return core.offset_surface.get([&] { return measured(core); });
 }
 
 }  // namespace overlapper

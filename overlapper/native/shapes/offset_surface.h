@@ -1,13 +1,15 @@
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "geometry/once.h"
 #include "geometry/vec.h"
 
 namespace overlapper {
 
-struct Hull;
+struct HullData;
 
 /// The surface of a rounded hull by features of its core: a moved facet, a band of a cylinder along each edge, a part
 /// of a sphere at each vertex. The numbers do not depend on the radius. Normals are rounded from double-doubles.
@@ -45,6 +47,24 @@ struct OffsetSurface {
   double volume(double radius) const;
 };
 
-OffsetSurface offset_surface(const Hull& core);
+/// The surface of a polytope, computed on first use. A copy of the polytope may change, so it starts without one.
+class KeptOffsetSurface {
+ public:
+  KeptOffsetSurface() = default;
+  KeptOffsetSurface(const KeptOffsetSurface&) {}
+  KeptOffsetSurface& operator=(const KeptOffsetSurface&) {
+    return kept_ = std::make_unique<Once<OffsetSurface>>(), *this;
+  }
+
+  template <class Compute>
+  const OffsetSurface& get(Compute compute) const {
+    return kept_->get(compute);
+  }
+
+ private:
+  std::unique_ptr<Once<OffsetSurface>> kept_ = std::make_unique<Once<OffsetSurface>>();
+};
+
+const OffsetSurface& offset_surface(const HullData& core);
 
 }  // namespace overlapper

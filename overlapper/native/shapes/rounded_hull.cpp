@@ -42,7 +42,7 @@ Foot foot(const RoundedHull& rounded, Vec3 x) {
   hull.graph->facet_towards(hull, x, gauge);
   if (gauge < 1 - rounding) return nearest;
   const double within = from_centroid * (std::max(0.0, 1 - 1 / gauge) + rounding);
-  const FacetTree& tree = rounded.facet_tree();
+  const FacetTree& tree = rounded.parts->get([&] { return FacetTree(hull); });
   nearest = tree.foot(hull, x, within * within);
   if (gauge > 1 + rounding && !(norm2(nearest.outward) > 0)) nearest = tree.foot(hull, x, kInfinity);
   return nearest;
@@ -98,14 +98,6 @@ RoundedHull make_rounded_hull(std::span<const Vec3> points, double radius) {
   if (rounded.core.data->edges.empty())
     throw std::invalid_argument("vertices must not be so flat that rounding errors leave no edges");
   return rounded;
-}
-
-const FacetTree& RoundedHull::facet_tree() const {
-  return kept_->tree.get([this] { return FacetTree(*core.data); });
-}
-
-const OffsetSurface& RoundedHull::surface() const {
-  return kept_->surface.get([this] { return offset_surface(core); });
 }
 
 double RoundedHull::volume() const {

@@ -3,7 +3,6 @@
 #include "geometry/once.h"
 #include "shapes/facet_tree.h"
 #include "shapes/hull.h"
-#include "shapes/offset_surface.h"
 
 namespace overlapper {
 
@@ -79,16 +78,7 @@ Examples
 
   Hull core;
   double radius = 0;
-
-  const FacetTree& facet_tree() const;  ///< of the core
-  const OffsetSurface& surface() const;
-
- private:
-  struct Kept {
-    Once<FacetTree> tree;
-    Once<OffsetSurface> surface;
-  };
-  std::shared_ptr<const Kept> kept_ = std::make_shared<Kept>();
+  std::shared_ptr<const Once<FacetTree>> parts = std::make_shared<Once<FacetTree>>();  ///< of the core
 };
 
 RoundedHull make_rounded_hull(std::span<const Vec3> points, double radius);

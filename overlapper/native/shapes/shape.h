@@ -111,6 +111,9 @@ inline double radius(const Shape& shape) {
   return ask(shape, [](const auto& s) { return s.bounding_radius(); });
 }
 
+/// True for a rounded hull: smooth, with a polytope as its core.
+inline bool rounded_hull(const Shape& shape) { return smooth(shape) && polytope_of(shape); }
+
 /// Facets of a box or a hull; 1 for a half-space, 0 for a smooth shape.
 inline int facets(const Shape& shape) {
   return ask_flat(shape, [](const auto& s) { return s.facet_count(); });

@@ -50,9 +50,9 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
 }
 
 std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b) {
-  const bool first = std::holds_alternative<RoundedHull>(a.shape);
+  const bool first = rounded_hull(a.shape);
   const Placed &rounded = first ? a : b, &other = first ? b : a;
-  if (!std::holds_alternative<RoundedHull>(rounded.shape) || smooth(other.shape)) return std::nullopt;
+  if (!rounded_hull(rounded.shape) || smooth(other.shape)) return std::nullopt;
   return offset::volume_in_polytope(rounded, other);
 }
 

@@ -11,7 +11,6 @@
 #include "geometry/scratch.h"
 #include "geometry/wide_pose.h"
 #include "methods/round/slicing/rules.h"
-#include "shapes/rounded_hull.h"
 
 namespace overlapper::offset {
 namespace {
@@ -362,12 +361,11 @@ class BelowPlane {
 }  // namespace
 
 std::optional<VolumeAlone> volume_below_plane(const Placed& rounded_hull, const Placed& flat, int facet) {
-  const RoundedHull& own = std::get<RoundedHull>(rounded_hull.shape);
-  const OffsetSurface& surface = own.surface();
+  const HullData& hull = *polytope_of(rounded_hull.shape);
+  const OffsetSurface& surface = offset_surface(hull);
   const std::optional<WidePlane> exact = unit_facet(flat.shape, facet);
   if (!surface.exact || !exact) return std::nullopt;
-  const HullData& hull = *own.core.data;
-  const double r = own.radius;
+  const double r = core_radius(rounded_hull.shape);
   const Plane plane = flat.pose * overlapper::facet(flat.shape, facet);
   Vec3 normal = apply_transposed(rounded_hull.pose.rotation, plane.normal);
   const double offset = -signed_distance(plane, rounded_hull.pose.translation);

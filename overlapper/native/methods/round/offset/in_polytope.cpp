@@ -13,7 +13,6 @@
 #include "geometry/rounding.h"
 #include "geometry/scratch.h"
 #include "methods/round/offset/below_plane.h"
-#include "shapes/rounded_hull.h"
 
 namespace overlapper::offset {
 namespace {
@@ -82,11 +81,11 @@ double solid_angle(Vec3 a, Vec3 b, Vec3 c) {
 
 class InPolytope {
  public:
-  InPolytope(const RoundedHull& rounded, std::span<const Edge> edges, Vec3 apex, double tie, PolytopeWork& work)
+  InPolytope(const Shape& rounded, std::span<const Edge> edges, Vec3 apex, double tie, PolytopeWork& work)
       : rounded_(rounded),
-        surface_(rounded.surface()),
-        hull_(*rounded.core.data),
-        r_(rounded.radius),
+        surface_(offset_surface(*polytope_of(rounded))),
+        hull_(*polytope_of(rounded)),
+        r_(core_radius(rounded)),
         edges_(edges),
         apex_(apex),
         tie_(tie),
@@ -550,13 +549,16 @@ class InPolytope {
           else if (to == kUnknown) to = from, changed = true;
         }
       }
-      if (work_.inside[c] == kUnknown)
-        work_.inside[c] = signed_distance(rounded_.tightest(work_.corners[c]), work_.corners[c]) < 0;
+      if (work_.inside[c] == kUnknown) work_.inside[c] = holds(work_.corners[c]);
     }
     return true;
   }
 
-  const RoundedHull& rounded_;
+  bool holds(Vec3 point) const {
+    return ask(rounded_, [&](const auto& shape) { return signed_distance(shape.tightest(point), point) < 0; });
+  }
+
+  const Shape& rounded_;
   const OffsetSurface& surface_;
   const HullData& hull_;
   double r_;
@@ -590,10 +592,8 @@ bool become(const Placed& rounded_hull, const Placed& polytope, PolytopeWork& wo
 
 /// The number of the plane that alone cuts the rounded hull; kNone if several do, and the number of planes if none
 /// does. Heights may be off by `rounding`.
-int only_cut(const RoundedHull& rounded, double rounding, const PolytopeWork& work) {
-  const HullData& hull = *rounded.core.data;
+int only_cut(const HullData& hull, double r, double rounding, const PolytopeWork& work) {
   const int faces = static_cast<int>(work.faces.size()), vertices = static_cast<int>(hull.vertices.size());
-  const double r = rounded.radius;
   const auto height = [&](int v, int j) { return work.heights[v * faces + j]; };
   double least_depth = kInfinity;
   int deepest = faces;
@@ -634,16 +634,16 @@ int only_cut(const RoundedHull& rounded, double rounding, const PolytopeWork& wo
 
 std::optional<VolumeAlone> volume_in_polytope(const Placed& rounded_hull, const Placed& polytope) {
   if (!bounded(polytope.shape)) return volume_below_plane(rounded_hull, polytope, 0);
-  const RoundedHull& rounded = std::get<RoundedHull>(rounded_hull.shape);
-  const OffsetSurface& surface = rounded.surface();
+  const HullData& hull = *polytope_of(rounded_hull.shape);
+  const OffsetSurface& surface = offset_surface(hull);
   const Scratch<PolytopeWork> work;
   if (!surface.exact || !become(rounded_hull, polytope, *work)) return std::nullopt;
-  const double r = rounded.radius;
+  const double r = core_radius(rounded_hull.shape);
   const double size = norm(rounded_hull.pose.translation - polytope.pose.translation) + reach(rounded_hull.shape) +
                       reach(polytope.shape);
   const double off = rounding(reach(rounded_hull, reach(polytope, size))) + flatness(polytope.shape);
   const double tie = 4 * off;
-  const std::vector<Vec3>& vertices = rounded.core.data->vertices;
+  const std::vector<Vec3>& vertices = hull.vertices;
   Bounds own{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}}, other = own;
   work->heights.resize(vertices.size() * work->faces.size()), work->sides.assign(vertices.size(), {});
   double* height = work->heights.data();
@@ -657,7 +657,7 @@ std::optional<VolumeAlone> volume_in_polytope(const Placed& rounded_hull, const 
     }
     work->sides[v] = {below, above};
   }
-  const int cut = only_cut(rounded, 2 * off, *work);
+  const int cut = only_cut(hull, r, 2 * off, *work);
   if (cut == static_cast<int>(work->faces.size())) {
     const double whole = surface.volume(r);
     return VolumeAlone{whole, kRoundingOfTerms * whole};
@@ -670,7 +670,7 @@ std::optional<VolumeAlone> volume_in_polytope(const Placed& rounded_hull, const 
   for (Face& face : work->faces) {
     face.origin = apex - signed_distance(face.plane, apex) * face.plane.normal;
   }
-  InPolytope part(rounded, edges(polytope.shape), apex, tie, *work);
+  InPolytope part(rounded_hull.shape, edges(polytope.shape), apex, tie, *work);
   if (!part.add_all()) return std::nullopt;
   const VolumeAlone found{part.volume(), part.error(off, norm(upper - lower))};
   if (!(found.volume > 0 && found.error <= kEnough * found.volume)) return std::nullopt;
