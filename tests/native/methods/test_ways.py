@@ -6,7 +6,22 @@ from pathlib import Path
 import pytest
 from families import prism
 
-from overlapper import Box, Hull, Overlap, Overlaps, Placed, overlap, overlaps, random_polytope
+from overlapper import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Overlap,
+    Overlaps,
+    Placed,
+    RoundedHull,
+    Sphere,
+    overlap,
+    overlaps,
+    random_polytope,
+)
 from speed.ways import AROUND, CUBE, FLOOR, TURN, TYPICAL
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -98,6 +113,27 @@ def test_a_batch_answers_typical_pairs_by_the_same_way(name):
     found = in_batch(bodies)
     assert [Overlaps.WAYS[k] for k in found.way] == [way]
     assert found[0].way == way
+
+
+WITH_A_ROUNDED_HULL = {
+    "half-space": (HalfSpace([0, 0, 1], 0), "closed form"),
+    "box": (Box([0.5, 0.5, 0.5]), "closed form"),
+    "hull": (Hull([[-1, -1, -1], [1, -1, -1], [0, 1, -1], [0, 0, 1]]), "closed form"),
+    "ball": (Sphere(0.5), "slicing"),
+    "capsule": (Capsule(0.3, 1.0), "slicing"),
+    "cylinder": (Cylinder(0.3, 1.0), "slicing"),
+    "ellipsoid": (Ellipsoid([0.3, 0.4, 0.5]), "slicing"),
+    "rounded hull": (RoundedHull([[-1, -1, -1], [1, -1, -1], [0, 1, -1], [0, 0, 1]], 0.1), "slicing"),
+}
+
+
+@pytest.mark.parametrize("kind", WITH_A_ROUNDED_HULL)
+def test_a_rounded_hull_and_each_kind_of_shape_have_their_way(kind):
+    other, way = WITH_A_ROUNDED_HULL[kind]
+    body = Placed(RoundedHull([[0, 0, 0], [0.9, 0.1, 0], [0, 0.8, 0.2], [0.1, 0, 0.7]], 0.05), (0.2, 0.1, -0.3), TURN)
+    found = overlap(body, Placed(other))
+    assert found.way == way
+    assert in_batch((body, Placed(other)))[0].way == way
 
 
 # With a box around them, which leaves what they share as it is.
