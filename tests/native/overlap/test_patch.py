@@ -327,6 +327,10 @@ def test_patches_of_a_batch_have_the_bits_of_single_answers_by_every_way():
             for shape, where, how in ((SHAPES[make], position, turned), (other, np.zeros(3), (0, 0, 0, 1))):
                 shapes.append(shape), positions.append(where), orientations.append(how)
             pairs.append((len(shapes) - 2, len(shapes) - 1))
+    shapes += [Cylinder(0.5, 1.0), Cylinder(0.4, 1.2)]
+    positions += [np.zeros(3), np.array([0.3, 0.2, 0.1])]
+    orientations += [quaternion(rng), quaternion(rng)]
+    pairs.append((len(shapes) - 2, len(shapes) - 1))
     batch = Batch(shapes)
     found = batch.overlaps(positions, orientations, pairs)
     assert {"clipping", "wide clipping", "closed form", "slicing"} <= {found.WAYS[way] for way in found.way}
