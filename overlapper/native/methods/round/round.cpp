@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "geometry/rounding.h"
+#include "methods/round/offset/in_ball.h"
 #include "methods/round/offset/in_polytope.h"
 
 namespace overlapper {
@@ -52,8 +53,11 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
 std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b) {
   const bool first = rounded_hull(a.shape);
   const Placed &rounded = first ? a : b, &other = first ? b : a;
-  if (!rounded_hull(rounded.shape) || smooth(other.shape)) return std::nullopt;
-  return offset::volume_in_polytope(rounded, other);
+  if (!rounded_hull(rounded.shape)) return std::nullopt;
+  if (!smooth(other.shape)) return offset::volume_in_polytope(rounded, other);
+  const auto revolved = revolution(other.shape);
+  if (revolved && revolved->round_ends && revolved->half_length == 0) return offset::volume_in_ball(rounded, other);
+  return std::nullopt;
 }
 
 std::optional<pieces::RoundMeasures> measure_by_slices(const pieces::SlicedPair& pair) {

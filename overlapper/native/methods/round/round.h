@@ -84,7 +84,7 @@ inline constexpr std::array<RoundChoice, 13> kRoundChoices{{
 std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference);
 
 /// The volume of an overlapping pair by the surface of a rounded hull, if one body is a rounded hull and the other one
-/// a half-space, a box or a hull.
+/// a half-space, a box, a hull or a ball.
 std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b);
 
 /// The measures of an overlapping pair by slices.

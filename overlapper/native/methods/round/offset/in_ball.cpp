@@ -1,0 +1,693 @@
+#include "methods/round/offset/in_ball.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "geometry/constants.h"
+#include "geometry/rounding.h"
+#include "geometry/scratch.h"
+#include "geometry/wide_pose.h"
+#include "methods/round/slicing/rules.h"
+#include "shapes/hull_data.h"
+
+namespace overlapper::offset {
+namespace {
+
+/// Rounding of unit vectors: normals and directions of edges.
+constexpr double kOfDirections = 8 * kUnit;
+/// Rounding of a term, relative to its size. No term takes more than 60 operations that each may round.
+constexpr double kOfTermsInBall = 64 * kUnit;
+
+struct Sum {
+  double value = 0, size = 0;
+  void add(double term) { value += term, size += std::abs(term); }
+  void add(const Sum& other, double factor) { value += factor * other.value, size += std::abs(factor) * other.size; }
+};
+
+/// A direction in a plane, not unit.
+struct Flat {
+  double x, y;
+};
+double cross(Flat a, Flat b) { return a.x * b.y - a.y * b.x; }
+/// From a to b. Opposite directions are half a turn apart, never minus half a turn.
+double angle(Flat a, Flat b) { return std::atan2(cross(a, b) + 0.0, a.x * b.x + a.y * b.y); }
+
+/// A closed line around the point where the ball's centre is seen.
+struct Turns {
+  Vec3 x, y;                   ///< two axes of the plane that it is seen in
+  int around = 0;              ///< turns of the whole line
+  double part = 0;             ///< angle of its parts in the ball
+  double most = 0;             ///< m²: bound of R² − ρ² on these parts
+  double segment = kInfinity;  ///< m²: bound of the area beyond a side
+  Sum sums;                    ///< integrals over these parts
+
+  Flat seen(Vec3 v) const {
+    const Flat flat{dot(v, x), dot(v, y)};
+    // The middle has no direction. Any direction will do for all lines that end there.
+    return flat.x == 0 && flat.y == 0 ? Flat{1e-100, 0} : flat;
+  }
+  /// Counts how often the line crosses the negative x axis.
+  void pass(Flat from, Flat to) {
+    if ((from.y > 0) == (to.y > 0)) return;
+    const double side = cross(from, to);
+    if (from.y > 0 && side >= 0) ++around;
+    if (to.y > 0 && side < 0) --around;
+  }
+};
+
+struct BallCorner {
+  Vec3 apart;                  ///< from the ball's centre to the vertex
+  double distance = 0;         ///< m, of the vertex
+  double slack = 0, near = 0;  ///< R − ρ and ρ at the point of its sphere nearest to the centre
+  double far = 0;              ///< R − ρ at the farthest point
+  double power = 0;            ///< m²: distance² − r²
+  double excess = 0;           ///< m²: power − R²
+  Turns turns;                 ///< of the normals, about the direction to the centre
+  bool exact = false;
+};
+
+struct BallFacet {
+  double height = 0;           ///< m, of the ball's centre above the facet of the core
+  int plane = -1;              ///< number of its plane in double-double
+  double slack = 0, near = 0;  ///< R − ρ and ρ at the point of its moved plane nearest to the centre
+  Turns turns;                 ///< of its corners, about the foot of the centre
+};
+
+/// Where an edge of the core is, seen from the ball's centre.
+struct BallEdge {
+  int number = 0;
+  Vec3 to_centre;              ///< unit, from the line of the edge
+  double distance = 0;         ///< m, of the line
+  double from = 0, to = 0;     ///< m, along the edge from the foot of the centre
+  double depth = 0;            ///< R + r − distance
+  double from2 = 0, to2 = 0;   ///< m²: R² − ρ² where the band's lines nearest to the centre end
+  double left = 0, right = 0;  ///< angles ψ of the facets' normals, if `exact`
+  bool exact = false;
+};
+
+struct BallWork {
+  std::vector<WidePlane> planes;
+  std::vector<BallCorner> corners;
+  std::vector<BallFacet> facets;
+  std::vector<BallEdge> edges;
+};
+
+/// An integral over an analytic function by rules of Gauss and Legendre. A rule of n nodes has an error of about
+/// ϱ^-2n, for the largest ellipse about the ends of the range without a singularity, with half axes of sum ϱ
+/// (Trefethen 2013). A range with a singularity too near is halved.
+class Integral {
+ public:
+  /// A singularity, and its mirror images at the real axis and at zero.
+  struct Singularity {
+    double real, imaginary;
+  };
+  Integral(Singularity a, Singularity b) : singularities_{a, b} {}
+
+  /// Half the larger axis of the ellipse, for half a range of 1.
+  double axis(double low, double high) const {
+    const double half = (high - low) / 2, middle = (low + high) / 2;
+    double least = kInfinity;
+    for (const Singularity& s : singularities_) {
+      const double y = s.imaginary * s.imaginary;
+      const double x = s.real - std::abs(middle), before = x + half, after = x - half;
+      least = std::min(least, std::sqrt(before * before + y) + std::sqrt(after * after + y));
+    }
+    return least / (2 * half);
+  }
+
+  /// Adds the integral of f. False if a singularity is too near.
+  template <class F>
+  bool add(double low, double high, F f, Sum& sum, int halvings = 0) const {
+    const double half = (high - low) / 2, middle = (low + high) / 2, least = axis(low, high);
+    // ϱ^-2n is 2^-55 at 5.5, 1.80, 1.33 and 1.18, and less than 2^-57 at these.
+    if (least > 6) return by(slicing::kNodes8, middle, half, f, sum), true;
+    if (least > 1.9) return by(slicing::kNodes16, middle, half, f, sum), true;
+    if (least > 1.4) return by(slicing::kNodes24, middle, half, f, sum), true;
+    if (least > 1.23) return by(slicing::kNodes32, middle, half, f, sum), true;
+    constexpr int kMost = 10;
+    if (halvings == kMost || !(least >= 1)) return false;
+    return add(low, middle, f, sum, halvings + 1) && add(middle, high, f, sum, halvings + 1);
+  }
+
+ private:
+  template <class Nodes, class F>
+  static void by(const Nodes& nodes, double middle, double half, F f, Sum& sum) {
+    double value = 0, size = 0;
+    f.set(middle);
+    for (const slicing::Node& node : nodes) {
+      const auto [low, high] = f(half * (1 - 2 * node.fraction));
+      // The weights of these nodes are for an integral over cos θ.
+      const double weight = node.weight / node.sine;
+      value += weight * (low.value + high.value), size += weight * (low.size + high.size);
+    }
+    sum.value += 4 * half / kPi * value, sum.size += 4 * half / kPi * size;
+  }
+
+  std::array<Singularity, 2> singularities_;
+};
+
+/// A function of sin χ and cos χ.
+template <class F>
+struct OfAngle {
+  F f;
+  double sine = 0, cosine = 1;
+  void set(double middle) { sine = std::sin(middle), cosine = std::cos(middle); }
+  std::array<Sum, 2> operator()(double by) const {
+    const double s = std::sin(by), c = std::cos(by);
+    return {f(sine * c - cosine * s, cosine * c + sine * s), f(sine * c + cosine * s, cosine * c - sine * s)};
+  }
+};
+template <class F>
+OfAngle(F) -> OfAngle<F>;
+
+template <class F>
+struct OfLength {
+  F f;
+  double middle = 0;
+  void set(double at) { middle = at; }
+  std::array<Sum, 2> operator()(double by) const { return {f(middle - by), f(middle + by)}; }
+};
+template <class F>
+OfLength(F) -> OfLength<F>;
+
+/// Functions grow as exp(6 |Im χ|). From here on, that matters more than singularities.
+constexpr double kFarthestPole = 1.2;
+/// A range with a shorter ellipse to the nearest singularity is integrated in another form.
+constexpr double kLeastAxis = 1.4;
+/// If R² − ρ² is more than this, relative to R², differences of terms lose no more than a few digits.
+constexpr double kDeepInBall = 0.05;
+
+class InBall {
+ public:
+  InBall(const OffsetSurface& surface, double r, double ball, BallWork& work)
+      : surface_(surface), r_(r), ball_(ball), work_(work) {}
+
+  bool add_all() {
+    for (BallFacet& facet : work_.facets)
+      if (facet.slack > 0) {
+        const Vec3 n = surface_.facets[&facet - work_.facets.data()].normal;
+        facet.turns = {any_orthogonal(n), {}, 0, 0, 0, kInfinity, {}}, facet.turns.y = cross(n, facet.turns.x);
+      }
+    for (BallCorner& corner : work_.corners)
+      if (corner.slack > 0) {
+        const Vec3 to_centre = -corner.apart / corner.distance;
+        corner.turns = {any_orthogonal(to_centre), {}, 0, 0, 0, kInfinity, {}};
+        corner.turns.y = cross(to_centre, corner.turns.x);
+      }
+    for (const OffsetSurface::Edge& edge : surface_.edges) turn(edge);
+    for (const BallEdge& edge : work_.edges)
+      if (!add_edge(edge)) return false;
+    for (size_t f = 0; f < work_.facets.size(); ++f)
+      if (work_.facets[f].slack > 0) add_facet(work_.facets[f], surface_.facets[f].area);
+    for (size_t v = 0; v < work_.corners.size(); ++v)
+      if (work_.corners[v].slack > 0) add_corner(work_.corners[v], surface_.vertices[v].solid_angle);
+    return true;
+  }
+  const Sum& flux() const { return flux_; }
+  /// If distances of the centre from features may be off by `rounding`.
+  double error(double rounding) const {
+    return rounding * area_ + kOfDirections * tilted_ + kOfTermsInBall * flux_.size;
+  }
+
+ private:
+  void turn(const OffsetSurface::Edge& edge) {
+    BallCorner &from = work_.corners[edge.from], &to = work_.corners[edge.to];
+    const Vec3 left = surface_.facets[edge.left].normal, right = surface_.facets[edge.right].normal;
+    if (Turns& turns = work_.facets[edge.left].turns; work_.facets[edge.left].slack > 0)
+      turns.pass(turns.seen(from.apart), turns.seen(to.apart));
+    if (Turns& turns = work_.facets[edge.right].turns; work_.facets[edge.right].slack > 0)
+      turns.pass(turns.seen(to.apart), turns.seen(from.apart));
+    if (from.slack > 0) from.turns.pass(from.turns.seen(right), from.turns.seen(left));
+    if (to.slack > 0) to.turns.pass(to.turns.seen(left), to.turns.seen(right));
+  }
+
+  /// Adds the angle of the part from a to b of a line from `first` to `last`, or of the part from b to a of the
+  /// opposite line if `side` is negative.
+  static void add_part(Turns& turns, double side, Flat a, Flat b, Flat first, Flat last) {
+    if (side < 0) std::swap(a, b), std::swap(first, last);
+    const double whole = angle(first, last);
+    double part = angle(a, b);
+    // Past the middle, a part turns by half, one way or the other: always as the whole line does.
+    if (part * whole < 0 && std::abs(part) > kPi / 2) part += std::copysign(2 * kPi, whole);
+    turns.part += part;
+  }
+
+  /// |F·n| is not more at this distance from the centre.
+  double most_at(double distance) const {
+    return std::abs(ball_ * ball_ * ball_ / (distance * distance) - distance) / 3;
+  }
+
+  bool add_edge(const BallEdge& edge) {
+    const OffsetSurface::Edge& own = surface_.edges[edge.number];
+    const Vec3 e = own.along, g = edge.to_centre, k = cross(e, g);
+    const Vec3 left = surface_.facets[own.left].normal, right = surface_.facets[own.right].normal;
+    const double d = edge.distance, r = r_, ball = ball_, gap = d - r, fourfold = 4 * d * r;
+    // Seen along the edge, the direction from its line to the centre is ψ = 0. The nearest line of the whole cylinder
+    // has a chord of 2 √`chord2`.
+    const double chord2 = edge.depth * (ball - r + d);
+    if (!(chord2 > 0)) return true;
+    const double start = edge.exact ? edge.left : std::atan2(dot(left, k), dot(left, g));
+    const double end = edge.exact ? edge.right : start + own.angle;
+    if (work_.facets[own.left].slack > 0)
+      if (!add_line(edge, work_.facets[own.left], start, 1, own.from, own.to)) return false;
+    if (work_.facets[own.right].slack > 0)
+      if (!add_line(edge, work_.facets[own.right], end, -1, own.to, own.from)) return false;
+
+    // sin ψ/2 = κ sin χ. If the sphere cuts all lines of the cylinder, κ = 1. Otherwise the chord is zero at χ = ±π/2,
+    // and a smooth function of χ up to there.
+    const double ratio = fourfold > 0 ? std::sqrt(chord2 / fourfold) : kInfinity, kappa = std::min(1.0, ratio);
+    const double to_end = ratio < 1 ? std::acosh(1 / ratio) : ratio < kInfinity ? std::acosh(ratio) : kInfinity;
+    // The centre lies on the surface at χ = ±i y.
+    const double to_surface = fourfold > 0 ? std::asinh(std::abs(gap) / (std::sqrt(fourfold) * kappa)) : kInfinity;
+    const auto of_psi = [&](double psi) {
+      if (ratio >= 1) return psi / 2;
+      const double h = std::sin(psi / 2) / kappa;
+      return std::abs(h) < 1 ? std::atan2(h, std::sqrt((1 - h) * (1 + h))) : std::copysign(kPi / 2, h);
+    };
+    const auto psi_of = [&](double chi) {
+      return ratio < 1 ? 2 * std::asin(std::clamp(kappa * std::sin(chi), -1.0, 1.0)) : 2 * chi;
+    };
+    const auto widest = [&](double square) {
+      if (!(square > 0)) return -1.0;
+      if (ratio < 1) return std::atan2(std::sqrt(square), std::sqrt(std::max(0.0, chord2 - square)));
+      return square < fourfold ? std::asin(std::sqrt(square / fourfold)) : kPi / 2;
+    };
+    const bool astride = edge.from < 0 && edge.to > 0;
+    BallCorner &from = work_.corners[own.from], &to = work_.corners[own.to];
+    const auto flats = [&](const BallCorner& corner) {
+      return corner.slack > 0 ? std::array{corner.turns.seen(left), corner.turns.seen(right)}
+                              : std::array{Flat{}, Flat{}};
+    };
+    End ends[2]{{from, edge.from, edge.from2, -1, edge.from >= 0 ? 1.0 : -1.0, flats(from)},
+                {to, edge.to, edge.to2, 1, edge.to <= 0 ? 1.0 : -1.0, flats(to)}};
+    const double widest_sine = std::max(std::abs(std::sin(start / 2)), std::abs(std::sin(end / 2)));
+    if (end < kPi &&
+        std::min(edge.from2, edge.to2) - fourfold * widest_sine * widest_sine > kDeepInBall * ball * ball) {
+      // The whole band is deep in the ball. χ = ψ/2, and no chord is needed.
+      const double low = start / 2, high = end / 2;
+      const double surface = fourfold > 0 ? std::asinh(std::abs(gap) / std::sqrt(fourfold)) : kFarthestPole;
+      double to_foot = std::min(surface, kFarthestPole), to_pole = kFarthestPole;
+      for (End& one : ends) one.choose(d, 1, low, high, surface, kFarthestPole, to_foot, to_pole);
+      const auto f = [&](double sine, double cosine) {
+        const double squared = sine * sine, moved = fourfold * squared, q2 = gap * gap + moved;
+        const double rho0 = std::sqrt(q2 + ends[0].z * ends[0].z), rho1 = std::sqrt(q2 + ends[1].z * ends[1].z);
+        const double scale = 2 * (2 * d * squared - gap);
+        const double more = ball * ball * ball * (ends[1].z * rho0 - ends[0].z * rho1) / (q2 * rho0 * rho1);
+        Sum sum{scale * (own.length - more), std::abs(scale) * (own.length + std::abs(more))};
+        add_arc(ends[0], squared, cosine * cosine, rho0, ball - rho0, 2, d, sum);
+        add_arc(ends[1], squared, cosine * cosine, rho1, ball - rho1, 2, d, sum);
+        return sum;
+      };
+      Sum band;
+      if (!Integral({0, to_foot}, {kPi / 2, to_pole}).add(low, high, OfAngle{f}, band)) return false;
+      flux_.add(band, r / 3);
+      for (End& one : ends) {
+        if (one.anchored && !one.whole)
+          add_part(one.corner.turns, one.side, one.flats[0], one.flats[1], one.flats[0], one.flats[1]);
+        add_bounds(one, start, end, d);
+      }
+      area_ += r * own.angle * own.length;
+      return true;
+    }
+    for (const double turned : {0.0, 2 * kPi}) {
+      const double first = std::max(start - turned, -kPi), last = std::min(end - turned, kPi);
+      if (!(first < last)) continue;
+      const double low = of_psi(first), high = of_psi(last);
+      if (!(low < high)) continue;
+      const bool from_left = turned == 0, to_right = end - turned <= kPi;
+      const auto slope = [&](double cosine, double other) {
+        return ratio < 1 ? 2 * kappa * cosine / std::sqrt(other) : 2.0;
+      };
+      const auto half_chord = [&](double cosine, double squared) {
+        return ratio < 1 ? std::sqrt(chord2) * cosine : std::sqrt(std::max(0.0, chord2 - fourfold * squared));
+      };
+      if (astride) {
+        const auto f = [&](double sine, double cosine) {
+          const double squared = kappa * sine * kappa * sine;
+          const double other = cosine * cosine + (1 - kappa) * (1 + kappa) * sine * sine;
+          const double q2 = gap * gap + fourfold * squared, w = half_chord(cosine, squared);
+          const double term = slope(cosine, other) * 2 * w * w * w / q2 * (gap - 2 * d * squared);
+          return Sum{term, std::abs(term)};
+        };
+        Sum band;
+        if (!Integral({0, std::min(to_surface, kFarthestPole)}, {kPi / 2, std::min(to_end, kFarthestPole)})
+                 .add(low, high, OfAngle{f}, band))
+          return false;
+        flux_.add(band, r / 3);
+        const double chord = std::sqrt(chord2);
+        area_ += r * (psi_of(high) - psi_of(low)) * (std::min(edge.to, chord) - std::max(edge.from, -chord));
+      }
+      for (End& one : ends) {
+        const double width = widest(one.square), begin = std::max(low, -width), stop = std::min(high, width);
+        if (!(begin < stop)) continue;
+        const double away = std::abs(one.z), z2 = away * away;
+        double to_foot = std::min(to_surface, kFarthestPole), to_pole = std::min(to_end, kFarthestPole);
+        one.choose(d, kappa, begin, stop, to_surface, to_end, to_foot, to_pole);
+        // The border of the band adds to the band and to the sphere around the vertex.
+        const auto f = [&](double sine, double cosine) {
+          const double squared = kappa * sine * kappa * sine;
+          const double other = cosine * cosine + (1 - kappa) * (1 + kappa) * sine * sine;
+          const double rho = std::sqrt(gap * gap + fourfold * squared + z2), w = half_chord(cosine, squared);
+          const double s = (one.square - fourfold * squared) / (ball + rho);
+          const double t =
+              s * s * (ball + rho) * (w * (ball + rho) + ball * away) / ((w + away) * rho * (w * rho + ball * away));
+          const double scale = slope(cosine, other), of_band = scale * one.sign * t * (gap - 2 * d * squared);
+          Sum sum{of_band, std::abs(of_band)};
+          add_arc(one, squared, other, rho, s, scale, d, sum);
+          return sum;
+        };
+        Sum arcs;
+        if (!Integral({0, to_foot}, {kPi / 2, to_pole}).add(begin, stop, OfAngle{f}, arcs)) return false;
+        flux_.add(arcs, r / 3);
+        const double begin_psi = psi_of(begin), stop_psi = psi_of(stop);
+        if (one.anchored && !one.whole) {
+          const auto seen = [&](double psi) { return one.corner.turns.seen(std::cos(psi) * g + std::sin(psi) * k); };
+          add_part(one.corner.turns, one.side, begin > low || !from_left ? seen(begin_psi) : one.flats[0],
+                   stop < high || !to_right ? seen(stop_psi) : one.flats[1], one.flats[0], one.flats[1]);
+        }
+        add_bounds(one, begin_psi, stop_psi, d);
+        if (!astride && one.sign > 0) area_ += r * (stop_psi - begin_psi) * (std::sqrt(chord2) - away);
+      }
+    }
+    return true;
+  }
+
+  /// An end of a band.
+  struct End {
+    BallCorner& corner;
+    double z;                   ///< m, along the edge from the foot of the centre
+    double square;              ///< m²: R² − ρ² where the end is nearest to the centre
+    double side;                ///< 1 if the vertex's normals are on the left of the arc
+    double sign;                ///< of what is beyond the end, in the integral along the band
+    std::array<Flat, 2> flats;  ///< the facets' normals
+    bool with_arc = false, whole = false, anchored = false;
+
+    /// Chooses a form for the arc, and lowers the distances of singularities.
+    void choose(double d, double kappa, double low, double high, double to_surface, double to_end, double& to_foot,
+                double& to_pole) {
+      with_arc = corner.slack > 0, whole = corner.far > 0;
+      if (!with_arc) return;
+      // The arc has poles where the direction is towards the centre, and opposite to it.
+      const double length = corner.distance;
+      const double foot = std::asinh(std::abs(z) / (kappa * std::sqrt(2 * d * (length + d))));
+      to_pole = std::min({to_pole, to_end, std::acosh(std::sqrt((1 + length / d) / 2))});
+      const double nearest = std::min({to_foot, to_surface, foot});
+      anchored = whole || !(Integral({0, nearest}, {kPi / 2, to_pole}).axis(low, high) > kLeastAxis);
+      if (!anchored) to_foot = nearest;
+    }
+  };
+
+  /// Adds what the arc at an end has of the flux through the sphere around the vertex, in units of r / 3, where
+  /// `squared` is sin² ψ/2, and `other` is cos² ψ/2.
+  void add_arc(const End& end, double squared, double other, double rho, double s, double scale, double d,
+               Sum& sum) const {
+    const BallCorner& corner = end.corner;
+    if (end.anchored) {
+      const double factor =
+          -end.side * end.z * scale /
+          (rho * corner.near * (rho + corner.near) * (end.z * end.z / (corner.distance + d) + 2 * d * other));
+      sum.add(fall(corner, s, rho), factor);
+    } else if (end.with_arc) {
+      const double factor = end.side * end.z * scale / (2 * r_ * rho * (end.z * end.z + 4 * d * d * squared * other));
+      sum.add(cap(corner, s, rho), factor);
+    }
+  }
+
+  /// The flux through the cap of the sphere around a vertex, from R − ρ = s up to the ball's surface. For a radian, it
+  /// is this over 6 ρ and the distance of the vertex. With the power p of the centre, distance² − r², the integral is
+  /// that of (ρ − R³/ρ²) (ρ² − p). Far from the vertex, p − R² is exact; near its sphere, p is.
+  Sum cap(const BallCorner& corner, double s, double rho) const {
+    const double ball = ball_;
+    const bool close = corner.near < ball / 2;
+    const double first =
+        close ? rho * (ball * (s - 1.5 * ball) - s * s / 4) : ball * ball * s + rho * s * (ball - s / 4);
+    const double second = (close ? corner.power : corner.excess) / 2 * (3 * ball - s);
+    return {s * s * (first + second), s * s * (std::abs(first) + std::abs(second))};
+  }
+
+  /// How this flux falls from the nearest point of the sphere around the vertex to a point with R − ρ = s. For a
+  /// radian, it is this times the difference of s, over 6 ρ ρ' and the distance of the vertex.
+  Sum fall(const BallCorner& corner, double s, double rho) const {
+    const double s0 = corner.slack, ball = ball_, near = corner.near, both = rho * near, sum = rho + near;
+    if (near < ball / 2) {
+      const double cube = ball * ball * ball, first = both * (sum * (rho * rho + near * near) / 4 - cube);
+      const double second = corner.power * (cube - both * sum / 2);
+      return {first + second, both * cube + std::abs(second)};
+    }
+    const double y = s0 * s0 + s0 * s + s * s, x = s0 + s, xy = s0 * s;
+    const double first = ball * ball * (ball * y - xy * x) + ball * y * both;
+    const double second = x * (s0 * s0 + s * s) / 4 * both;
+    const double third = corner.excess / 2 * (3 * ball * (ball * x - xy) - ball * y + xy * x);
+    return {first - second + third, std::abs(first) + std::abs(second) + std::abs(third)};
+  }
+
+  void add_bounds(const End& end, double begin, double stop, double d) {
+    const double least = begin < 0 && stop > 0 ? 0 : std::sin(std::min(std::abs(begin), std::abs(stop)) / 2);
+    const double nearest2 = (d - r_) * (d - r_) + 4 * d * r_ * least * least + end.z * end.z;
+    tilted_ += r_ * r_ * (stop - begin) * most_at(std::sqrt(nearest2));
+    end.corner.turns.most = std::max(end.corner.turns.most, ball_ * ball_ - nearest2);
+  }
+
+  /// Adds a side of a moved facet, where it is a band's border at ψ. From first to last, the facet is on the left.
+  bool add_line(const BallEdge& edge, BallFacet& facet, double psi, double side, int first, int last) {
+    const double half_sine = std::sin(psi / 2), d = edge.distance, gap = d - r_;
+    const double moved = 4 * d * r_ * half_sine * half_sine, ball = ball_;
+    const double chord2 = edge.depth * (ball - r_ + d) - moved;
+    if (!(chord2 > 0)) return true;
+    const double chord = std::sqrt(chord2);
+    const double low = std::max(edge.from, -chord), high = std::min(edge.to, chord);
+    if (!(low < high)) return true;
+    const double q2 = gap * gap + moved, inner = side * d * std::sin(psi);  // from the side to the foot
+    const double s0 = facet.slack, near = facet.near, inner2 = inner * inner;
+    const double nearest2 = low < 0 && high > 0 ? 0 : std::min(low * low, high * high);
+    tilted_ +=
+        (edge.exact ? d * std::abs(std::sin(psi)) + r_ : d + r_) * (high - low) * most_at(std::sqrt(q2 + nearest2));
+    facet.turns.most = std::max(facet.turns.most, chord2 - nearest2);
+    if (inner < 0)
+      facet.turns.segment = std::min(facet.turns.segment, 2 * chord2 * chord / (-inner + std::sqrt(inner2 + chord2)));
+    Sum sums;
+    const auto done = [&] {
+      // R² − ρ² is a difference, which loses digits of its largest value.
+      facet.turns.sums.value += sums.value, facet.turns.sums.size += chord2 / (chord2 - nearest2) * sums.size;
+      return true;
+    };
+    // Along the side, the field is singular at ±i √q2, and the angle seen from the foot at ±i `inner`.
+    const Integral past_foot({0, std::abs(inner)}, {0, std::abs(inner)});
+    if (past_foot.axis(low, high) > kLeastAxis) {
+      const auto f = [&](double t) {
+        const double t2 = t * t, rho = std::sqrt(q2 + t2), s = (chord2 - t2) / (ball + rho);
+        const double term = -near * inner * s * s * (3 * ball - s) / (2 * rho * (inner2 + t2));
+        return Sum{term, std::abs(term)};
+      };
+      return past_foot.add(low, high, OfLength{f}, sums) && done();
+    }
+    const int number = side > 0 ? surface_.edges[edge.number].left : surface_.edges[edge.number].right;
+    const Vec3 e = surface_.edges[edge.number].along;
+    const Vec3 in_plane = side * cross(surface_.facets[number].normal, e);
+    const Flat along = facet.turns.seen(e), inwards = facet.turns.seen(in_plane);
+    const auto at = [&](double t) { return Flat{t * along.x - inner * inwards.x, t * along.y - inner * inwards.y}; };
+    const Flat flat_first = facet.turns.seen(work_.corners[side > 0 ? first : last].apart);
+    const Flat flat_last = facet.turns.seen(work_.corners[side > 0 ? last : first].apart);
+    add_part(facet.turns, side, low > edge.from ? at(low) : flat_first, high < edge.to ? at(high) : flat_last,
+             flat_first, flat_last);
+    const Integral integral({0, std::sqrt(q2)}, {0, std::sqrt(q2)});
+    if (integral.axis(low, high) > kLeastAxis) {
+      const auto f = [&](double t) {
+        const double rho = std::sqrt(q2 + t * t), s = (chord2 - t * t) / (ball + rho);
+        const double y = s0 * s0 + s0 * s + s * s, x = s0 + s, xy = s0 * s;
+        const double term =
+            inner * (3 * ball * ball * x - 3 * ball * xy - ball * y + xy * x) / (2 * rho * (rho + near));
+        return Sum{term, std::abs(term)};
+      };
+      return integral.add(low, high, OfLength{f}, sums) && done();
+    }
+    // The contact is deep. The angle seen from the foot is more than the solid angle seen from the centre, over the
+    // height, by this much.
+    const auto more = [&](double t) {
+      const double t2 = t * t, rho = std::sqrt(q2 + t2);
+      return std::atan2(t * inner * (inner2 + t2), (rho + near) * (inner2 * rho + near * t2));
+    };
+    sums.add(ball * ball * ball * (more(high) - more(low)));
+    sums.add(-near * inner * (high - low) / 2);
+    return done();
+  }
+
+  void add_facet(const BallFacet& facet, double area) {
+    const Turns& turns = facet.turns;
+    const double s = facet.slack, cap = s * s * (3 * ball_ - s) / 2;
+    const double rest = 2 * kPi * turns.around - turns.part;
+    const double side = facet.height > r_ ? 1.0 / 3 : -1.0 / 3;
+    flux_.value += side * (turns.sums.value + cap * rest);
+    flux_.size += turns.sums.size / 3 + cap / 3 * (2 * kPi * std::abs(turns.around) + std::abs(turns.part));
+    area_ += turns.around == 0 ? std::min({area, turns.segment, kPi * turns.most})
+                               : std::min(area, kPi * s * (2 * ball_ - s));
+  }
+
+  void add_corner(const BallCorner& corner, double solid_angle) {
+    const Turns& turns = corner.turns;
+    const double s = corner.slack, near = corner.near, far = corner.far;
+    if (far > 0) {
+      if (turns.around < 0) {
+        // The normals are all around the direction away from the centre. The flux through the whole sphere is added.
+        const double rho = ball_ - far;
+        const double factor = 2 * kPi * (s - far) / (rho * near * 6 * corner.distance);
+        flux_.add(fall(corner, far, rho), factor);
+      }
+    } else {
+      const Sum each = cap(corner, s, near);
+      const double whole = 2 * kPi * std::max(0, turns.around), scale = 1 / (6 * corner.distance * near);
+      flux_.value += scale * each.value * (whole - turns.part);
+      flux_.size += scale * each.size * (whole + std::abs(turns.part));
+    }
+    const double most = turns.around == 0 ? turns.most : s * (2 * ball_ - s);
+    area_ += r_ * std::min(r_ * solid_angle, kPi * most / corner.distance);
+  }
+
+  const OffsetSurface& surface_;
+  double r_, ball_;
+  BallWork& work_;
+  Sum flux_;
+  double area_ = 0;    ///< m²: bound of the area in the ball
+  double tilted_ = 0;  ///< m³: what a tilt of unit vectors by 1 rad would add
+};
+
+WidePlane exact_plane(const HullData& hull, int f) {
+  const auto [a, b, c] = hull.facet_corners[f];
+  const WideVector normal = unit(wide_normal(hull.corners[a], hull.corners[b], hull.corners[c]));
+  return {normal, dot(normal, wide(hull.corners[a]))};
+}
+
+}  // namespace
+
+std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Placed& ball) {
+  const HullData& hull = *polytope_of(rounded_hull.shape);
+  const OffsetSurface& surface = offset_surface(hull);
+  if (!surface.exact) return std::nullopt;
+  const double r = core_radius(rounded_hull.shape), radius = revolution(ball.shape)->radius, sum = radius + r;
+  const bool turned = !unturned(rounded_hull.orientation);
+  WideVector exactly = wide_difference(ball.position, rounded_hull.position);
+  const double apart = norm(rounded_hull.position - ball.position);
+  if (turned) exactly = apply_transposed(wide_rotation(rounded_hull.orientation), exactly);
+  exactly = exactly - wide(hull.origin);
+  const Vec3 centre = rounded(exactly);
+
+  const Scratch<BallWork> work;
+  work->corners.assign(hull.vertices.size(), {}), work->facets.assign(hull.planes.size(), {}), work->edges.clear(),
+      work->planes.clear();
+  double nearest = kInfinity, farthest = 0;  // distances of the core
+  for (size_t v = 0; v < hull.vertices.size(); ++v) {
+    BallCorner& corner = work->corners[v];
+    corner.apart = hull.vertices[v] - centre, corner.distance = std::sqrt(norm2(corner.apart));
+    nearest = std::min(nearest, corner.distance), farthest = std::max(farthest, corner.distance);
+  }
+  const double whole_ball = 4.0 / 3.0 * kPi * radius * radius * radius;
+  if (farthest + r <= radius) {
+    const double whole = surface.volume(r);
+    return VolumeAlone{whole, kOfTermsInBall * whole};
+  }
+  double off = wide_placing(apart + norm(hull.origin) + reach(rounded_hull.shape), turned);
+  double highest = -kInfinity;
+  int highest_facet = 0;
+  for (int f = 0; f < static_cast<int>(work->facets.size()); ++f) {
+    BallFacet& facet = work->facets[f];
+    facet.height = -dot(surface.facets[f].normal, work->corners[hull.facet(f)[0]].apart);
+    if (facet.height > highest) highest = facet.height, highest_facet = f;
+  }
+  const double doubtful = off + kOfDirections * (farthest + radius);
+  for (int i = 0; i < static_cast<int>(surface.edges.size()); ++i) {
+    const OffsetSurface::Edge& own = surface.edges[i];
+    const Vec3 a = work->corners[own.from].apart;
+    BallEdge edge;
+    edge.number = i, edge.from = dot(a, own.along), edge.to = edge.from + own.length;
+    const Vec3 across = edge.from * own.along - a;
+    const double line2 = norm2(across);
+    const double beside = edge.from > 0 ? edge.from : edge.to < 0 ? edge.to : 0;
+    if (line2 + beside * beside > (sum + doubtful) * (sum + doubtful)) continue;
+    edge.distance = std::sqrt(line2);
+    edge.to_centre = edge.distance > 0 ? across / edge.distance : any_orthogonal(own.along);
+    if (beside == 0) nearest = std::min(nearest, edge.distance);
+    work->edges.push_back(edge);
+  }
+  if (highest > 0) {
+    // If the foot is on the facet, the plane is nearest.
+    const Vec3 n = surface.facets[highest_facet].normal;
+    const auto ring = hull.facet(highest_facet);
+    bool foot = true;
+    for (size_t i = 0; foot && i < ring.size(); ++i) {
+      const Vec3 a = work->corners[ring[i]].apart, b = work->corners[ring[(i + 1) % ring.size()]].apart;
+      foot = dot(n, cross(a, b)) > 0;
+    }
+    if (foot) nearest = std::min(nearest, highest);
+  }
+  const bool inside = highest <= 0 || nearest < r;
+  const double depth = inside ? radius : sum - nearest;
+
+  // In a shallow contact, depths are taken in double-doubles.
+  constexpr double kSure = 0x1p-45;
+  const bool wide_too = !(doubtful < kSure * depth);
+  for (int f = 0; f < static_cast<int>(work->facets.size()); ++f) {
+    BallFacet& facet = work->facets[f];
+    facet.slack = radius - std::abs(facet.height - r);
+    if (wide_too && facet.slack >= -doubtful) {
+      facet.plane = static_cast<int>(work->planes.size());
+      work->planes.push_back(exact_plane(hull, f));
+      const DoubleDouble height = signed_distance(work->planes.back(), exactly);
+      facet.height = height.head, facet.slack = (DoubleDouble{radius} - abs(height - DoubleDouble{r})).head;
+    }
+    facet.near = radius - facet.slack;
+  }
+  for (BallCorner& corner : work->corners) corner.slack = radius - std::abs(corner.distance - r);
+  for (BallEdge& edge : work->edges) {
+    const OffsetSurface::Edge& own = surface.edges[edge.number];
+    BallCorner &from = work->corners[own.from], &to = work->corners[own.to];
+    if (!wide_too) {
+      edge.depth = sum - edge.distance;
+      const double chord2 = edge.depth * (radius - r + edge.distance);
+      edge.from2 = chord2 - edge.from * edge.from, edge.to2 = chord2 - edge.to * edge.to;
+      continue;
+    }
+    const Vec3 a = hull.vertices[own.from], b = hull.vertices[own.to];
+    const WideVector to_a = wide(a) - exactly, to_b = wide(b) - exactly, along = unit(wide_difference(b, a));
+    const DoubleDouble first = dot(to_a, along), last = dot(to_b, along);
+    const DoubleDouble near2 = dot(to_a, to_a), far2 = dot(to_b, to_b), line = sqrt(near2 - first * first);
+    const DoubleDouble both = DoubleDouble{radius} + DoubleDouble{r};
+    const DoubleDouble deep = both - line;
+    const DoubleDouble chord2 = deep * (DoubleDouble{radius} - DoubleDouble{r} + line);
+    edge.distance = line.head, edge.depth = deep.head, edge.from = first.head, edge.to = last.head;
+    edge.from2 = (chord2 - first * first).head, edge.to2 = (chord2 - last * last).head;
+    edge.exact = true;
+    const auto angle_of = [&](int f) {
+      const BallFacet& facet = work->facets[f];
+      if (facet.plane < 0) {
+        const Vec3 n = surface.facets[f].normal;
+        return std::atan2(dot(n, cross(own.along, edge.to_centre)), dot(n, edge.to_centre));
+      }
+      return std::atan2(-dot(cross(work->planes[facet.plane].normal, along), to_a).head, facet.height);
+    };
+    edge.left = angle_of(own.left), edge.right = angle_of(own.right);
+    edge.right = edge.left + std::max(0.0, std::remainder(edge.right - edge.left, 2 * kPi));
+    for (const auto& [corner, square] : {std::pair{&from, near2}, std::pair{&to, far2}})
+      if (!corner->exact) {
+        const DoubleDouble distance = sqrt(square);
+        corner->exact = true, corner->distance = distance.head;
+        corner->slack = (DoubleDouble{radius} - abs(distance - DoubleDouble{r})).head;
+      }
+  }
+  for (BallCorner& corner : work->corners) {
+    const double s = corner.slack, l = corner.distance;
+    corner.near = radius - s, corner.far = radius - l - r;
+    corner.power = (l > r ? corner.near : -corner.near) * (l + r);
+    corner.excess = l > r ? 2 * r * corner.near - s * (2 * radius - s) : corner.power - radius * radius;
+  }
+  InBall part(surface, r, radius, *work);
+  if (!part.add_all()) return std::nullopt;
+  const double whole = inside ? whole_ball : 0;
+  if (!wide_too) off = doubtful;
+  const VolumeAlone found{whole + part.flux().value, part.error(off) + kOfTermsInBall * whole};
+  if (!(found.volume > 0 && found.error <= kEnough * found.volume)) return std::nullopt;
+  return found;
+}
+
+}  // namespace overlapper::offset
