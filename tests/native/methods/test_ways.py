@@ -119,7 +119,7 @@ WITH_A_ROUNDED_HULL = {
     "half-space": (HalfSpace([0, 0, 1], 0), "closed form"),
     "box": (Box([0.5, 0.5, 0.5]), "closed form"),
     "hull": (Hull([[-1, -1, -1], [1, -1, -1], [0, 1, -1], [0, 0, 1]]), "closed form"),
-    "ball": (Sphere(0.5), "slicing"),
+    "ball": (Sphere(0.5), "closed form"),
     "capsule": (Capsule(0.3, 1.0), "slicing"),
     "cylinder": (Cylinder(0.3, 1.0), "slicing"),
     "ellipsoid": (Ellipsoid([0.3, 0.4, 0.5]), "slicing"),

@@ -1,0 +1,243 @@
+"""Volumes of a rounded hull in a ball, by the surface of the rounded hull.
+
+The references are caps and lenses in 40 digits, sections integrated in 40 digits, Steiner's formula, slices of the pair
+with a third body around both, and certificates.
+"""
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+from overlapper import HalfSpace, Placed, RoundedHull, Sphere, overlap
+
+CUBE_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+HALF = np.array([0.5, 0.25, 0.125])
+TURNS = [(0, 0, 0, 1), (0, 0, 1, 1), (1, 1, 1, 1), (0, 0.6, 0, 0.8)]
+FAR = np.array([2.0**20, -(2.0**21), 2.0**19])
+DEPTHS = [2.0**-4, 2.0**-8, 2.0**-16, 2.0**-24]
+BALL = 0.375
+
+
+@pytest.fixture(autouse=True)
+def digits():
+    with mp.workdps(40):
+        yield
+
+
+def points(rng, count):
+    rows = rng.normal(size=(count, 3))
+    return rows / np.linalg.norm(rows, axis=1)[:, None] * rng.uniform(0.3, 0.6, 3)
+
+
+def pair(rng, depth=None, far=0.0):
+    """A rounded hull and a ball that overlap; pulled apart to the depth, if one is given."""
+    while True:
+        body = RoundedHull(points(rng, rng.choice([4, 8, 20, 60])), 10 ** rng.uniform(-4, -0.7))
+        a = Placed(Sphere(rng.uniform(0.2, 0.7)), rng.normal(size=3) * 0.4)
+        b = Placed(body, (0, 0, 0), rng.normal(size=4))
+        found = overlap(a, b)
+        if found and depth is not None:
+            a = Placed(a.shape, a.position + max(0.0, found.depth - depth) * found.normal)
+            found = overlap(a, b)
+        if found:
+            return Placed(a.shape, a.position + far), Placed(body, b.position + far, b.orientation)
+
+
+def rounded_box(r, at=(0, 0, 0), turn=(0, 0, 0, 1)):
+    return Placed(RoundedHull(CUBE_CORNERS * HALF, r), at, turn)
+
+
+def within(found, expected, beside=2e-15):
+    """The stated error holds, but for the rounding of a position that the test gives."""
+    return abs(mpf(found.volume) - expected) <= mpf(found.volume_error) + beside * abs(expected)
+
+
+def cap(radius, depth):
+    return mp.pi * depth**2 * (3 * radius - depth) / 3
+
+
+def lens(a, b, apart):
+    depth = a + b - apart
+    return mp.pi * depth**2 * (apart**2 + 2 * apart * (a + b) - 3 * (a - b) ** 2) / (12 * apart)
+
+
+def common_disc(a, b, apart):
+    """m² of two discs."""
+    if apart >= a + b:
+        return mpf(0)
+    if apart <= abs(a - b):
+        return mp.pi * min(a, b) ** 2
+    x = (apart**2 + a**2 - b**2) / (2 * apart)
+    return (
+        a**2 * mp.acos(x / a) - x * mp.sqrt(a**2 - x**2) + b**2 * mp.acos((apart - x) / b)
+        - (apart - x) * mp.sqrt(b**2 - (apart - x) ** 2)
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("depth", DEPTHS)
+@pytest.mark.parametrize("r", [2.0**-10, 2.0**-4])
+@pytest.mark.parametrize("far", [np.zeros(3), FAR])
+def test_over_a_face_there_is_a_cap(depth, r, far):
+    at = np.array([0.0625, -0.03125, 0.125 + r + BALL - depth])
+    found = overlap(Placed(Sphere(BALL), at + far), rounded_box(r, far))
+    lost = 0.125 + r + mpf(BALL) - (mpf((at + far)[2]) - mpf(far[2]))
+    assert found.way == "closed form"
+    if depth < 2.0**-5:  # otherwise the ball reaches edges
+        assert within(found, cap(mpf(BALL), lost))
+    assert found.volume_error <= 1e-12 * found.volume
+
+
+@pytest.mark.parametrize("depth", DEPTHS[1:])
+@pytest.mark.parametrize("turn", TURNS)
+def test_over_a_corner_there_is_a_lens_of_two_balls(depth, turn):
+    r = 2.0**-4
+    at = HALF + np.array([6, 6, 7]) / 11 * (r + BALL - depth)
+    found = overlap(Placed(Sphere(BALL), at), rounded_box(r))
+    apart = mp.sqrt(sum((mpf(x) - mpf(y)) ** 2 for x, y in zip(at, HALF)))
+    assert found.way == "closed form"
+    assert within(found, lens(mpf(BALL), mpf(r), apart))
+    # Turned about the corner, nothing changes but rounding.
+    turned = Placed(RoundedHull((CUBE_CORNERS - 1) * HALF, r), (0, 0, 0), turn)
+    axis, w = np.array(turn[:3]) / np.linalg.norm(turn), turn[3] / np.linalg.norm(turn)
+    direction = np.array([6, 6, 7]) / 11
+    direction = direction + 2 * np.cross(axis, np.cross(axis, direction) + w * direction)
+    ball = Placed(Sphere(BALL), direction * (r + BALL - depth))
+    found = overlap(ball, turned)
+    apart = mp.sqrt(sum(mpf(x) ** 2 for x in ball.position))
+    assert found.way == "closed form"
+    assert within(found, lens(mpf(BALL), mpf(r), apart))
+
+
+@pytest.mark.parametrize("depth", DEPTHS[1:])
+def test_over_an_edge_sections_are_common_parts_of_two_discs(depth):
+    r = 2.0**-4
+    at = np.array([0.0625, 0.25, 0.125]) + np.array([0, 3, 4]) / 5 * (r + BALL - depth)
+    found = overlap(Placed(Sphere(BALL), at), rounded_box(r))
+    apart = mp.sqrt((mpf(at[1]) - 0.25) ** 2 + (mpf(at[2]) - 0.125) ** 2)
+    reach = mp.sqrt(mpf(BALL) ** 2 - (apart - r) ** 2)
+
+    def section(angle):
+        t = reach * mp.sin(angle)
+        return common_disc(mp.sqrt(mpf(BALL) ** 2 - t**2), mpf(r), apart) * reach * mp.cos(angle)
+
+    assert found.way == "closed form"
+    assert within(found, 2 * mp.quad(section, [0, mp.pi / 4, mp.pi / 2]))
+
+
+@pytest.mark.parametrize("depth", DEPTHS[1:])
+@pytest.mark.parametrize("share", [0.9, 0.25, 0.0, -0.25])
+def test_over_a_face_and_an_edge_sections_are_segments(depth, share):
+    """The foot of the centre is inside the face, by that share of the cap's radius, or outside."""
+    r = 2.0**-4
+    ball = mpf(BALL)
+    at = np.array([0.0625, 0.25 - share * np.sqrt(2 * BALL * depth), 0.125 + r + BALL - depth])
+    found = overlap(Placed(Sphere(BALL), at), rounded_box(r))
+    inwards, height = mpf(0.25) - mpf(at[1]), mpf(at[2]) - 0.125 - r
+
+    def surface(u):  # of the rounded hull, at u from the edge into the face
+        return mpf(0) if u >= 0 else -mpf(r) + mp.sqrt(max(mpf(0), mpf(r) ** 2 - u**2))
+
+    def section(u):
+        square = ball**2 - (u - inwards) ** 2
+        if square <= 0:
+            return mpf(0)
+        over = height - surface(u)
+        return (
+            square * mp.acos(over / mp.sqrt(square)) - over * mp.sqrt(square - over**2) if square > over**2 else mpf(0)
+        )
+
+    def end(side, low, high):  # where the section vanishes, by bisection
+        for _ in range(140):
+            middle = (low + high) / 2
+            gone = ball**2 - (middle - inwards) ** 2 <= (height - surface(middle)) ** 2
+            low, high = (low, middle) if gone == (side > 0) else (middle, high)
+        return middle
+
+    deepest = max((mpf(0), inwards) if inwards > 0 else (inwards * r / (r + ball),), key=section)
+    low = end(-1, -mpf(r), min(deepest, mpf(0)))
+    high = end(1, max(deepest, mpf(0)), inwards + ball) if section(mpf(0)) > 0 else end(1, deepest, mpf(0))
+
+    def part(a, b):
+        def f(angle):
+            return section((a + b) / 2 - (b - a) / 2 * mp.cos(angle)) * (b - a) / 2 * mp.sin(angle)
+
+        return mp.quad(f, [0, mp.pi / 4, mp.pi / 2, 3 * mp.pi / 4, mp.pi])
+
+    expected = part(low, mpf(0)) + part(mpf(0), high) if high > 0 else part(low, high)
+    assert within(found, expected)
+
+
+@pytest.mark.parametrize("far", [np.zeros(3), FAR])
+def test_a_ball_inside_has_its_own_volume_and_a_hull_inside_has_steiners(far):
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        body = RoundedHull(points(rng, 20), 10 ** rng.uniform(-3, -1))
+        turn, at = rng.normal(size=4), rng.normal(size=3) * 0.01
+        small = overlap(Placed(Sphere(0.1), at + far), rounded_box(0.0625, far, turn))
+        assert small.way == "closed form"
+        assert small.volume == pytest.approx(4 / 3 * np.pi * 0.1**3, rel=1e-14)
+        large = overlap(Placed(Sphere(1.5), at + far), Placed(body, far, turn))
+        assert large.way == "closed form"
+        assert large.volume == pytest.approx(body.volume, rel=1e-14)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 2.0**-30, -(2.0**-30)])
+def test_a_ball_that_touches_the_surface_from_inside_has_its_own_volume(beyond):
+    r, ball = 2.0**-4, 0.1875 - 2.0**-6
+    for at in ([0, 0, 0.125 + r - ball + beyond], [0.5 + r - ball + beyond, 0.0625, 0]):
+        found = overlap(Placed(Sphere(ball), at), rounded_box(r))
+        outside = cap(mpf(ball), mpf(max(beyond, 0.0)))
+        assert within(found, 4 * mp.pi * mpf(ball) ** 3 / 3 - outside)
+
+
+@pytest.mark.parametrize("far", [np.zeros(3), FAR])
+def test_stated_errors_hold_against_slices_of_the_pair_with_a_body_around_both(far):
+    rng = np.random.default_rng(2)
+    for number in range(60):
+        a, b = pair(rng, 10 ** -rng.uniform(1, 6) if number % 2 else None, far)
+        found, sliced = overlap(a, b), overlap(a, b, Placed(HalfSpace([0, 0, 1], 10), far))
+        assert sliced.way == "slicing"
+        assert abs(found.volume - sliced.volume) <= found.volume_error + sliced.volume_error
+
+
+@pytest.mark.parametrize("far", [np.zeros(3), FAR])
+def test_stated_errors_hold_against_certificates(far):
+    rng = np.random.default_rng(3)
+    for number in range(10):
+        found = overlap(*pair(rng, 10 ** -rng.uniform(1, 6) if number % 2 else None, far))
+        lower, upper = found.certificate().verify()
+        assert float(lower) - found.volume_error <= found.volume <= float(upper) + found.volume_error
+
+
+def test_nearly_all_contacts_have_a_closed_form():
+    rng = np.random.default_rng(4)
+    found = [overlap(*pair(rng, 10 ** -rng.uniform(1, 6) if number % 2 else None)) for number in range(200)]
+    assert sum(one.way == "closed form" for one in found) >= 190
+    assert all(one.volume_error <= 1e-12 * one.volume for one in found if one.way == "closed form")
+
+
+def test_aligned_places_agree_with_slices():
+    r = 0.0625
+    for at in (
+        [0, 0, 0],
+        [0, 0, 0.125],
+        [0, 0, 0.1875],
+        [0.5, 0.25, 0.125],
+        [0.5, 0.25, 0.25],
+        [0.5, 0, 0],
+        [0, 0.3, 0.2],
+    ):
+        for ball in (0.03125, 0.1875, 0.25, 0.5):
+            for turn in TURNS:
+                a, b = Placed(Sphere(ball), at), rounded_box(r, turn=turn)
+                found = overlap(a, b)
+                if found:
+                    sliced = overlap(a, b, HalfSpace([0, 0, 1], 10))
+                    assert abs(found.volume - sliced.volume) <= found.volume_error + sliced.volume_error
+
+
+def test_other_measures_agree_with_the_volume():
+    first, then = (overlap(*pair(np.random.default_rng(5))) for _ in range(2))
+    volume = first.volume
+    assert then.centroid.shape == (3,)
+    assert (then.volume, then.volume_error, then.way) == (volume, first.volume_error, first.way)
