@@ -66,7 +66,6 @@ MENDED = {
     "an end of a cylinder that rushes across slices": ("cylinder, rounded hull", 52012),
     "parallel cylinders as thin as rounding": ("cylinder, cylinder", 70057),
     "parallel cylinders with round ends as thin as rounding": ("capsule, cylinder", 70325),
-    "a cap with the tip of a cone in its middle": ("ball, rounded hull", 50008),
     "rounding of two ellipsoids of other sizes": ("ellipsoid, ellipsoid", 70238),
     "what each of many faces may miss": ("ellipsoid, rounded hull", 80070),
     "what each of many faces of a flat rounded hull may miss": ("ellipsoid, rounded hull", 50122),
