@@ -24,8 +24,14 @@ DIRECTIONS, SLICES = 720, 25
 TURNS = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
 # How many times the sampling around each change is refined, and the number of new directions between two.
 CLOSER, FINER = 2, 16
+PARTS = np.arange(FINER + 1) / FINER
+# A surface that misses the outline by less than this share of its distance may meet it between two directions. The
+# place is sought with so many refinements.
+CLOSE, CLOSEST = 1e-3, 4
 # A surface that misses the outline by less than this share of its distance is tested for where it meets the outline.
 NEAR = 0.25
+# A point is on a surface if doubles tell no larger value or distance there.
+SAME = 1e-14
 # The bisection steps for the place of an event before Newton's method.
 HALVINGS = 12
 # The weight of the barrier at the ends of a body. The ends are then known to about this share of its length.
@@ -68,21 +74,23 @@ class Outlines:
         return point
 
     def at(self, t: float) -> Outline | None:
-        """The outline of a slice, in which the smallest sides may be missing."""
+        """The outline of a slice. None if the slice is not found, or if its order of sides is not cyclic."""
         p = self.inner(t)
         values, half = self._values(np.array([t, *p]))
         if not (values < 0).all():
             return None
-        turns, step = TURNS, TURNS[1]
+        turns = np.sort(np.append(TURNS, self._short_sides(half, values)))
         nearest, reach = self._nearest(half, values, turns)
         changes = np.flatnonzero(nearest != np.roll(nearest, -1))
         if len(changes) == 0:
             return Outline((int(nearest[0]),), np.zeros((0, 2)))
+        steps = np.diff(turns, append=2 * np.pi)[changes]
         for _ in range(CLOSER):
-            step /= FINER
-            turns = (turns[changes][:, None] + step * np.arange(FINER + 1)).ravel()
+            turns = (turns[changes][:, None] + steps[:, None] * PARTS).ravel()
+            steps = np.repeat(steps / FINER, FINER + 1)
             nearest, reach = self._nearest(half, values, turns)
             changes = np.flatnonzero(nearest[:-1] != nearest[1:])
+            steps = steps[changes]
         chain = tuple(int(k) for k in nearest[changes])
         following = [int(k) for k in nearest[changes + 1]]
         if following != [*chain[1:], chain[0]]:
@@ -90,7 +98,42 @@ class Outlines:
         far = (reach[changes] + reach[changes + 1]) / 2
         guesses = p + np.array([np.cos(turns[changes]), np.sin(turns[changes])]).T * far[:, None]
         corners = [self.corner(i, j, t, guess) for i, j, guess in zip(chain, following, guesses)]
-        return Outline(chain, np.array(corners))
+        return self._with_corners_cut(chain, corners, t)
+
+    def _short_sides(self, half: Floats, values: Floats) -> list[float]:
+        """Directions of surfaces that bound the slice only between two of the directions in which it is sampled."""
+        reach = self._reach(half, values, TURNS)
+        found = []
+        for k in range(len(reach)):
+            gap = reach[k] / np.delete(reach, k, 0).min(axis=0, initial=np.inf) - 1
+            least = (gap > SAME) & (gap < CLOSE) & (gap <= np.roll(gap, 1)) & (gap <= np.roll(gap, -1))
+            for middle in TURNS[least]:
+                step = TURNS[1]
+                for _ in range(CLOSEST):
+                    turns = middle + step * np.linspace(-1.0, 1.0, 2 * FINER + 1)
+                    near = self._reach(half, values, turns)
+                    gaps = near[k] / np.delete(near, k, 0).min(axis=0, initial=np.inf) - 1
+                    middle, step = turns[gaps.argmin()], step / FINER
+                    if gaps.min() < 0:
+                        found.append(middle % (2 * np.pi))
+                        break
+        return found
+
+    def _with_corners_cut(self, chain: tuple[int, ...], corners: list[Floats], t: float) -> Outline:
+        """The outline with the sides that are shorter than a step of directions, where they cut off a corner."""
+        sides, places = list(chain), list(corners)
+        k = 0
+        while k < len(sides) < len(chain) + len(self.forms):
+            i, j = sides[k], sides[(k + 1) % len(sides)]
+            values, _ = self._values(np.array([t, *places[k]]))
+            values[[i, j]] = 0.0
+            between = int(values.argmax())
+            if values[between] > SAME:
+                sides.insert(k + 1, between)
+                places[k : k + 1] = [self.corner(i, between, t, places[k]), self.corner(between, j, t, places[k])]
+            else:
+                k += 1
+        return Outline(tuple(sides), np.array(places))
 
     def _values(self, y: Floats) -> tuple[Floats, Floats]:
         half = self.forms @ y + self.linear

@@ -111,6 +111,20 @@ def test_halves_state_their_errors(reason):
         assert lower - error <= volume <= upper + error and error <= 2e-12 * volume
 
 
+# Contacts whose proved bounds once were too far apart, by what the outline of a slice left out.
+OUTLINES = {
+    "a short side where a third surface cuts off a corner": ("cylinder, ellipsoid", 10416),
+    "a short side of a surface that is cut off from inside": ("capsule, ellipsoid", 120240),
+    "a short side of a surface that is cut off obliquely": ("capsule, ellipsoid", 120384),
+}
+
+
+@pytest.mark.parametrize("reason", OUTLINES)
+def test_proved_bounds_are_narrow(reason):
+    judged = graded.judge(graded.made(*OUTLINES[reason]), True, only_volume=True)
+    assert judged.complaints == () and judged.proof_width < 1e-15
+
+
 def test_all_classes_of_the_page_are_graded():
     assert len(graded.CLASSES) == 44
 
