@@ -70,10 +70,17 @@ struct Axes {
   WideVector along_n, along_x, along_y;  ///< K n, K x, K y
   DoubleDouble xx, yy, xy;               ///< (K x) · (K x), ...
 
-  Axes(Vec3 normal, const WideMatrix& k) : n(normal), x(any_orthogonal(normal)), y(cross(normal, x)) {
+  /// With x along the contact, surfaces that are nearly parallel there have small components along y. These small
+  /// components are found in double-double, so the angles between surfaces have all digits.
+  Axes(Vec3 normal, Vec3 contact, const WideMatrix& k) : n(normal), x(along(normal, contact)), y(cross(normal, x)) {
     along_n = k * wide(n), along_x = k * wide(x), along_y = k * wide(y);
     xx = overlapper::dot(along_x, along_x), yy = overlapper::dot(along_y, along_y);
     xy = overlapper::dot(along_x, along_y);
+  }
+  static Vec3 along(Vec3 normal, Vec3 contact) {
+    const Vec3 found = contact - overlapper::dot(contact, normal) * normal;
+    constexpr double kLeast = 1e-3;
+    return norm2(found) > kLeast * kLeast * norm2(contact) ? unit(found) : any_orthogonal(normal);
   }
   double oval() const {
     const double mean = (xx.head + yy.head) / 2;
@@ -83,8 +90,8 @@ struct Axes {
 
 /// Axes whose slices are discs up to the rounding of doubles. Newton's method tilts them until the form of the second
 /// body is the same in all directions of the plane.
-Axes settled_axes(Vec3 normal, const WideMatrix& k) {
-  Axes axes(normal, k);
+Axes settled_axes(Vec3 normal, Vec3 contact, const WideMatrix& k) {
+  Axes axes(normal, contact, k);
   constexpr int kMostSteps = 3;
   for (int step = 0; step < kMostSteps && axes.oval() > 2 * DBL_EPSILON; ++step) {
     const double x = overlapper::dot(axes.along_x, axes.along_n).head,
@@ -93,7 +100,7 @@ Axes settled_axes(Vec3 normal, const WideMatrix& k) {
     if (!(size > 0)) break;
     const double tilt_x = (half * x + both * y) / size, tilt_y = (both * x - half * y) / size;
     if (!(tilt_x * tilt_x + tilt_y * tilt_y < 0x1p-20)) break;
-    const Axes next(unit(axes.n + tilt_x * axes.x + tilt_y * axes.y), k);
+    const Axes next(unit(axes.n + tilt_x * axes.x + tilt_y * axes.y), contact, k);
     if (!(next.oval() < axes.oval())) break;
     axes = next;
   }
@@ -204,7 +211,7 @@ std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::s
   const Mat3 plain = rounded(k);
   const Vec3 contact = rounded(c);
   const Vec3 along_rim = rim(walls, contact, slack_first.head);
-  const Axes axes = settled_axes(across_slices(principal(plain), contact, along_rim, other), k);
+  const Axes axes = settled_axes(across_slices(principal(plain), contact, along_rim, other), contact, k);
 
   Discs result;
   result.normal = axes.n, result.x = axes.x, result.y = axes.y;

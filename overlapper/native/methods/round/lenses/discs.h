@@ -28,6 +28,7 @@ inline Flat operator+(Flat a, Flat b) { return {a.x + b.x, a.y + b.y}; }
 inline Flat operator-(Flat a, Flat b) { return {a.x - b.x, a.y - b.y}; }
 inline Flat operator*(double s, Flat a) { return {s * a.x, s * a.y}; }
 inline double dot(Flat a, Flat b) { return a.x * b.x + a.y * b.y; }
+inline double norm(Flat a) { return std::sqrt(dot(a, a)); }
 inline double cross(Flat a, Flat b) { return a.x * b.y - a.y * b.x; }
 
 /// A vector that is linear in t.
@@ -35,10 +36,9 @@ struct Line {
   Flat start, slope;
   Flat at(double t) const { return start + t * slope; }
 };
-/// The size of its terms.
-inline double size_at(const Line& line, double t) {
-  return std::abs(line.start.x) + std::abs(line.start.y) +
-         std::abs(t) * (std::abs(line.slope.x) + std::abs(line.slope.y));
+/// The sizes of the terms of its coordinates.
+inline Flat sizes_at(const Line& line, double t) {
+  return {std::abs(line.start.x) + std::abs(t * line.slope.x), std::abs(line.start.y) + std::abs(t * line.slope.y)};
 }
 inline Quadratic dot(const Line& a, const Line& b) {
   return {dot(a.start, b.start), dot(a.start, b.slope) + dot(a.slope, b.start), dot(a.slope, b.slope)};

@@ -176,46 +176,58 @@ void add_second(const Place& place, const PlacedArc& of, const Wanted& wanted, S
   sums.border += angle * std::sqrt(square + grows * grows + square * dot(moves, moves));
 }
 
-/// The terms of a lens's slacks, and of its centres along the line of centres, whose rounding moves its arcs. The half
-/// chord is a root of slack + aside² + chord (2 along − chord). Here `along` and `aside` are the mean centre in the
-/// slice's own axes. The chord is half the difference of the slacks, over the distance of the centres. Places are at
-/// most `away` from the foot.
+/// Coordinates along other axes of the plane, by sizes: `ahead` is the first of these axes.
+Flat turned(Flat ahead, Flat sizes) {
+  const double x = std::abs(ahead.x), y = std::abs(ahead.y);
+  return {x * sizes.x + y * sizes.y, y * sizes.x + x * sizes.y};
+}
+
+/// The terms of a lens's slacks, and of its centres along the line of centres and aside, whose rounding moves its arcs.
+/// The half chord is a root of slack + aside² + chord (2 along − chord). Here `along` and `aside` are the mean centre
+/// in the slice's own axes. The chord is half the difference of the slacks, over the distance of the centres. Rounding
+/// of that distance stretches or twists these axes. Places are at most `reach` from the middle of the chord.
 ///
 /// The mean disc divides both the difference of the slacks and the distance of the centres. A disc that is much smaller
 /// than the other has a small part of both, and little of their rounding. Bodies without walls have the wider bound of
 /// whole sizes at first, which covers the rules, too.
 struct Terms {
-  std::array<double, 2> slack, centre;  ///< of the first disc and of the second
-  double away;
+  std::array<double, 2> slack, centre, aside;  ///< of the first disc and of the second
+  double square;                               ///< of the distance of places from the foot
 };
-Terms terms_of_lens(const Place& place, double reach) {
+Terms terms_of_lens(const Place& place, Flat reach) {
   const Discs& d = place.discs;
   const Section& s = place.section;
-  const double t = place.t, chord = std::abs(s.chord), aside = std::abs(s.aside), away = chord + aside + reach;
-  const Flat between = d.apart.at(t), middle = d.centre.at(t);
-  const double apart = std::sqrt(dot(between, between)), along = std::abs(dot(s.ahead, middle));
-  const double centres = size_at(d.centre, t), size_of_apart = size_at(d.apart, t), bend = size_of_apart / apart;
-  const double lever = along + chord, difference = size_at(d.difference, t);
-  const double slack = size_at(d.slack, t) + difference * lever / apart + away * away + d.misplaced +
-                       2 * aside * (centres + along * bend) + 2 * chord * (centres + (aside + lever) * bend);
+  const double t = place.t, chord = std::abs(s.chord), aside = std::abs(s.aside);
   const bool shared = d.cuts > 0 || d.shared;
-  const double centre = centres + chord * bend + (shared ? chord + aside * bend : 0);
-  const auto of = [&](double share) {
-    const double part = shared ? share : 1;
-    return std::array{slack + part * difference, centre + part * size_of_apart};
+  const auto own = [&](const Line& line) {
+    const Flat sizes = sizes_at(line, t);
+    return shared ? turned(s.ahead, sizes) : (sizes.x + sizes.y) * Flat{1, 1};
   };
-  const auto [first_slack, first_centre] = of(d.share);
-  const auto [second_slack, second_centre] = of(1 - d.share);
-  return {{first_slack, second_slack}, {first_centre, second_centre}, away};
+  const Flat away = Flat{chord, aside} + reach, middle = d.centre.at(t), centres = own(d.centre),
+             between = own(d.apart);
+  const double apart = norm(d.apart.at(t)), stretch = between.x / apart, twist = between.y / apart;
+  const double along = std::abs(dot(s.ahead, middle)), lever = along + chord, difference = size_at(d.difference, t);
+  const double square = dot(away, away);
+  const double slack = size_at(d.slack, t) + difference * lever / apart + square + d.misplaced +
+                       2 * aside * (centres.y + along * twist) +
+                       2 * chord * (centres.x + aside * twist + lever * stretch);
+  const double centre = centres.x + chord * stretch + (shared ? chord + aside * twist : 0);
+  Terms terms{{}, {}, {}, square};
+  for (const int k : {0, 1}) {
+    const double share = k == 0 ? d.share : 1 - d.share, part = shared ? share : 1;
+    terms.slack[k] = slack + part * difference, terms.centre[k] = centre + part * between.x;
+    terms.aside[k] = centres.y + along * twist + share * between.y;
+  }
+  return terms;
 }
 
 /// The movement of a lens's arcs by rounding, as slacks of both discs, in units of the last bit.
-void add_blur_of_lens(const Place& place, const Arc& first, const Arc& second, double reach, Sums& sums) {
+void add_blur_of_lens(const Place& place, const Arc& first, const Arc& second, Flat reach, Sums& sums) {
   const Terms terms = terms_of_lens(place, reach);
   // A misplaced centre along the line of centres changes its segment.
   sums.blur = first.half_angle * terms.slack[0] + second.half_angle * terms.slack[1] +
               2 * (terms.centre[0] * first.radius * bulge(first) + terms.centre[1] * second.radius * bulge(second));
-  sums.oval = second.half_angle * terms.away * terms.away;
+  sums.oval = second.half_angle * terms.square;
   sums.terms = std::ranges::max(terms.slack);
 }
 
@@ -246,7 +258,7 @@ Sums whole_slice(const Place& place, const Wanted& wanted) {
             a.second_along + b.second_along,
             0};
     const double rise = std::max(first.radius - s.to_first, second.radius - s.to_second);
-    add_blur_of_lens(place, first, second, s.half_chord + rise, sums);
+    add_blur_of_lens(place, first, second, {rise, s.half_chord + rise}, sums);
   } else {
     const bool is_first = s.outline == Outline::kFirst;
     const double square = std::max(0.0, at(is_first ? discs.first_square : discs.second_square, t));
@@ -273,37 +285,56 @@ Sums whole_slice(const Place& place, const Wanted& wanted) {
   return sums;
 }
 
+/// A curve of a region: half the angle of its arcs, or its length, and how far it reaches along the region's axes.
+struct Side {
+  double size = 0;
+  Flat reach;
+
+  void add(double more, Flat from, Flat to, double rise) {
+    size += more;
+    reach.x = std::max({reach.x, std::abs(from.x) + rise, std::abs(to.x) + rise});
+    reach.y = std::max({reach.y, std::abs(from.y) + rise, std::abs(to.y) + rise});
+  }
+};
+using Sides = std::array<Side, 2 + kMostCuts>;
+
 /// The blur of a region that walls cut: that of its arcs, and that of the walls.
-void add_blur_of_region(const Place& place, const Region& of, const std::array<double, 2>& half_angle,
-                        const std::array<double, kMostCuts>& length, Sums& sums) {
+void add_blur_of_region(const Place& place, const Region& of, const Sides& sides, Sums& sums) {
   const Discs& d = place.discs;
   const Section& s = place.section;
-  double reach = 0;
-  for (int i = 0; i < of.corners; ++i) reach = std::max({reach, std::abs(of.corner[i].x), std::abs(of.corner[i].y)});
+  Flat from_foot{};
   if (of.about_foot) {
     const std::array<const Quadratic*, 2> slack{&d.first_slack, &d.second_slack};
     const std::array<Line, 2> centre{d.first_centre(), d.second_centre()};
     for (const int k : {0, 1}) {
-      if (!(half_angle[k] > 0)) continue;
-      const double terms =
-          size_at(*slack[k], place.t) + reach * (2 * size_at(centre[k], place.t) + reach) + d.misplaced;
-      sums.blur += half_angle[k] * terms, sums.terms = std::max(sums.terms, terms);
+      const auto& [half_angle, reach] = sides[k];
+      if (!(half_angle > 0)) continue;
+      const double square = dot(reach, reach);
+      const double terms = size_at(*slack[k], place.t) +
+                           2 * dot(turned(of.ahead, sizes_at(centre[k], place.t)), reach) + square + d.misplaced;
+      sums.blur += half_angle * terms, sums.terms = std::max(sums.terms, terms);
+      if (k == 1) sums.oval = half_angle * square;
     }
-    sums.oval = half_angle[1] * reach * reach;
   } else {
+    Flat reach{};
+    for (const Side& side : sides) reach = {std::max(reach.x, side.reach.x), std::max(reach.y, side.reach.y)};
     const Terms terms = terms_of_lens(place, reach);
     const std::array<double, 2> rise{of.circle[0].radius - s.to_first, of.circle[1].radius - s.to_second};
-    sums.blur = half_angle[0] * terms.slack[0] + half_angle[1] * terms.slack[1] +
-                2 * (terms.centre[0] * half_angle[0] * rise[0] + terms.centre[1] * half_angle[1] * rise[1]);
-    sums.oval = half_angle[1] * terms.away * terms.away;
+    for (const int k : {0, 1})
+      sums.blur +=
+          sides[k].size * (terms.slack[k] + 2 * (terms.centre[k] * rise[k] + terms.aside[k] * sides[k].reach.y));
+    sums.oval = sides[1].size * terms.square;
     sums.terms = std::ranges::max(terms.slack);
+    from_foot = {std::abs(s.chord), std::abs(s.aside)};
   }
-  const double away = std::abs(of.origin.x) + std::abs(of.origin.y) + reach;
   for (int i = 0; i < d.cuts; ++i) {
-    if (!(length[i] > 0)) continue;
+    const auto& [length, reach] = sides[2 + i];
+    if (!(length > 0)) continue;
     const Cut& cut = d.cut[i];
-    const double terms = (std::abs(cut.offset) + std::abs(cut.rate * place.t) + d.misplaced) / cut.length + away;
-    sums.blur += length[i] * terms;
+    const Flat normal = turned(of.ahead, {std::abs(cut.normal.x), std::abs(cut.normal.y)});
+    // Points of the wall are as far from the foot as its side there.
+    const double terms = (d.misplaced + 2 * dot(normal, reach + from_foot)) / cut.length;
+    sums.blur += length * terms;
     sums.terms = std::max(sums.terms, terms);
   }
 }
@@ -326,8 +357,7 @@ Sums cut_slice(const Place& place, const Wanted& wanted) {
   const Vec3 e{0, of.ahead.x, of.ahead.y}, f{0, of.aside().x, of.aside().y};
   const Vec3 origin = place.foot + Vec3{0, of.origin.x, of.origin.y};
   FlatMoments flat;
-  std::array<double, 2> half_angle{};
-  std::array<double, kMostCuts> length{};
+  Sides sides{};
   for (int i = 0; i < of.corners; ++i) {
     const int curve = of.corner[i].curve;
     const Flat from = of.corner[i].at(), to = of.next(i), way = to - from;
@@ -335,7 +365,7 @@ Sums cut_slice(const Place& place, const Wanted& wanted) {
     const double whole = std::sqrt(dot(way, way));
     if (!(whole > 0)) continue;
     if (curve >= 2) {
-      length[curve - 2] = whole;
+      sides[curve].add(whole, from, to, 0);
       add_wall(place, place.discs.cut[curve - 2], whole, wanted, sums);
       continue;
     }
@@ -344,13 +374,13 @@ Sums cut_slice(const Place& place, const Wanted& wanted) {
     const Arc a = arc(whole / 2, dot(middle - circle.centre, out));
     const quadric::Segment s = segment(a);
     flat.add(middle, out, s.area, s.first_across, s.second_across, s.second_along);
-    half_angle[curve] += a.half_angle;
+    sides[curve].add(a.half_angle, from, to, a.radius * (1 - a.cosine));
     const PlacedArc placed{a, origin + (middle.x * e + middle.y * f), out.x * e + out.y * f, along.x * e + along.y * f};
     if (curve == 0) add_first(place, placed, s.area, wanted, sums);
     else add_second(place, placed, wanted, sums);
   }
   add_moments(flat, origin, e, f, sums);
-  add_blur_of_region(place, of, half_angle, length, sums);
+  add_blur_of_region(place, of, sides, sums);
   return sums;
 }
 
