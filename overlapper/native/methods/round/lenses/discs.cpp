@@ -52,15 +52,15 @@ Vec3 rim(std::span<const slicing::Wall> walls, Vec3 contact, double slack) {
 }
 
 /// The direction across the slices. There are two such directions; this is the one that is more across the contact, or
-/// more along a rim, unless the other one is wanted.
-Vec3 across_slices(const Principal& of, Vec3 contact, Vec3 rim, bool other) {
+/// more along the part, unless the other one is wanted.
+Vec3 across_slices(const Principal& of, Vec3 contact, Vec3 along, bool other) {
   const auto& [low, middle, high] = of.value;
   const double whole = high - low;
   if (!(whole > 4 * DBL_EPSILON * high)) return norm2(contact) > 0 ? any_orthogonal(unit(contact)) : of.axis[0];
   const double sine = std::sqrt((high - middle) / whole), cosine = std::sqrt((middle - low) / whole);
   const Vec3 a = cosine * of.axis[0] + sine * of.axis[2], b = cosine * of.axis[0] - sine * of.axis[2];
   const auto size = [](Vec3 p, Vec3 q) { return std::abs(overlapper::dot(p, q)); };
-  if (norm2(rim) > 0) return unit((size(a, rim) >= size(b, rim)) != other ? a : b);
+  if (norm2(along) > 0) return unit((size(a, along) >= size(b, along)) != other ? a : b);
   return unit((size(a, contact) <= size(b, contact)) != other ? a : b);
 }
 
@@ -202,7 +202,7 @@ std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& seco
 }
 
 std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::span<const slicing::Wall> walls,
-                           bool other) {
+                           bool other, Vec3 leading) {
   const WideMatrix& k = second.k;
   const WideVector& k_centre = second.middle;
   const DoubleDouble one{1}, slack_first = one - overlapper::dot(c, c),
@@ -210,8 +210,8 @@ std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::s
   if (!(slack_first.head > 0) || walls.size() > kMostCuts) return std::nullopt;
   const Mat3 plain = rounded(k);
   const Vec3 contact = rounded(c);
-  const Vec3 along_rim = rim(walls, contact, slack_first.head);
-  const Axes axes = settled_axes(across_slices(principal(plain), contact, along_rim, other), contact, k);
+  if (norm2(leading) == 0) leading = rim(walls, contact, slack_first.head);
+  const Axes axes = settled_axes(across_slices(principal(plain), contact, leading, other), contact, k);
 
   Discs result;
   result.normal = axes.n, result.x = axes.x, result.y = axes.y;
@@ -238,8 +238,8 @@ std::optional<Discs> discs(const WideVector& c, const SecondBall& second, std::s
     lean = lean - (share * dot(aside, Flat{p_x.head, p_y.head}) / square) * aside;
   }
   constexpr double kLeastAlong = 1e-2;
-  if (const double rise = overlapper::dot(along_rim, axes.n); std::abs(rise) > kLeastAlong)
-    lean = {overlapper::dot(along_rim, axes.x) / rise, overlapper::dot(along_rim, axes.y) / rise};
+  if (const double rise = overlapper::dot(leading, axes.n); std::abs(rise) > kLeastAlong)
+    lean = {overlapper::dot(leading, axes.x) / rise, overlapper::dot(leading, axes.y) / rise};
   result.lean = lean, result.first_level = c_n.head;
   const DoubleDouble lean_x{lean.x}, lean_y{lean.y};
   const WideVector along = axes.along_n + (lean_x * axes.along_x + lean_y * axes.along_y);

@@ -133,9 +133,10 @@ std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& seco
 
 /// The same for a first body that is the unit ball about `centre`. No value if the inner point is not inside it, or if
 /// there are too many walls. Walls are planes in the same coordinates that cut the second body. The point may be
-/// outside the second body. With `other`, slices have the other of both possible directions.
+/// outside the second body. With `other`, slices have the other of both possible directions. The foot moves along
+/// `leading`, if that is given.
 std::optional<Discs> discs(const WideVector& centre, const SecondBall& second, std::span<const slicing::Wall> walls,
-                           bool other = false);
+                           bool other = false, Vec3 leading = {});
 
 /// Whether sections are closer to discs, relative to rounding, if `first` becomes the ball.
 bool better_first(const StretchedBall& first, const StretchedBall& second);

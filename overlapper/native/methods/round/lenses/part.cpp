@@ -55,33 +55,84 @@ bool contains_part(const InEllipsoid& of, const slicing::Round& round, std::span
 
 namespace {
 
-/// A part by slices of one direction.
+/// A part with a larger error, relative to its own volume and to that of all parts, is measured again about its
+/// centroid.
+constexpr double kFine = 1e-12, kFineOfAll = 2e-14;
+
+/// A part by slices of one direction, about an origin.
 struct Measured {
   Discs discs;
   Integral integral;
   pieces::Totals totals;
+  Vec3 origin;
+
+  const Sums& sums() const { return integral.sums; }
+  double volume() const { return totals.volume; }
+  double off() const { return totals.open + totals.error; }
+  /// The direction in which the part leads from slice to slice.
+  Vec3 leading() const {
+    const Moments& m = sums().moments;
+    const Vec3 mean = m.first / m.volume;
+    const double square = m.squares.x / m.volume - mean.x * mean.x;
+    return unit(discs.along_axes(
+        {square, m.products.z / m.volume - mean.x * mean.y, m.products.y / m.volume - mean.z * mean.x}));
+  }
+  /// ∫ y Nᵀ dA over the ball's part of the surface, about the inner point.
+  Mat3 moved() const { return discs.moved_along_axes(sums().moved) + outer(origin, discs.along_axes(sums().force)); }
 };
 
-/// No value if the part cannot be measured.
-std::optional<Measured> measured(const InEllipsoid& of, const slicing::Round& round,
-                                 std::span<const slicing::Wall> walls, const Wanted& wanted, bool other) {
-  std::optional<Discs> found = discs(of.centre, second_ball(round, of.stretch.half_axes), walls, other);
-  if (!found) return std::nullopt;
-  found->misplaced = of.misplaced / (kRoundings * DBL_EPSILON);
-  found->second_area = area_rate(round, found->normal, of.stretch.half_axes);
-  Measured result{*found, integrate(*found, wanted), {}};
-  const Sums& part = result.integral.sums;
-  const double volume = part.moments.volume;
-  if (!(volume > 0)) return result;
-  pieces::Totals& totals = result.totals;
-  static_cast<Moments&>(totals) = part.moments.along({found->normal, found->x, found->y});
-  totals.error = result.integral.error + kRoundings * DBL_EPSILON * (part.blur + volume) + kOfRules * volume +
-                 2 * found->oval * part.oval;
-  totals.border = part.border;
-  totals.unbalanced = found->along_axes(part.force + part.second_force + part.cut_force);
-  totals.open = pieces::missing(totals);
-  return result;
-}
+/// The part of a round inside walls, in an ellipsoid.
+struct Part {
+  const InEllipsoid& of;
+  const slicing::Round& round;
+  std::span<const slicing::Wall> walls;
+  Wanted wanted;
+
+  /// No value if the part cannot be measured.
+  std::optional<Measured> measured(bool other) const {
+    return measured(of.centre, second_ball(round, of.stretch.half_axes), walls, wanted, other, {}, {});
+  }
+  /// The same about the centroid, with the foot along the part. The inner point may be far from the part, and places
+  /// that count from there have fewer digits.
+  std::optional<Measured> measured_again(const Measured& before) const {
+    const Vec3 origin = before.totals.first / before.volume();
+    const WideVector step = wide(origin);
+    slicing::Round moved_round = round;
+    moved_round.centre = round.centre - step;
+    std::vector<slicing::Wall> moved_walls(walls.begin(), walls.end());
+    for (slicing::Wall& wall : moved_walls) wall.slack = wall.slack - dot(wall.normal, step);
+    Wanted moved_wanted = wanted;
+    if (wanted.view) {
+      moved_wanted.view->u0 += dot(wanted.view->u, origin);
+      moved_wanted.view->v0 += dot(wanted.view->v, origin);
+    }
+    return measured(of.centre - step, second_ball(moved_round, of.stretch.half_axes), moved_walls, moved_wanted, false,
+                    before.leading(), origin);
+  }
+
+ private:
+  std::optional<Measured> measured(const WideVector& centre, const SecondBall& second,
+                                   std::span<const slicing::Wall> within, const Wanted& what, bool other, Vec3 leading,
+                                   Vec3 origin) const {
+    std::optional<Discs> found = discs(centre, second, within, other, leading);
+    if (!found) return std::nullopt;
+    found->misplaced = of.misplaced / (kRoundings * DBL_EPSILON);
+    found->second_area = area_rate(round, found->normal, of.stretch.half_axes);
+    Measured result{*found, integrate(*found, what), {}, origin};
+    const Sums& part = result.sums();
+    const double volume = part.moments.volume;
+    if (!(volume > 0)) return result;
+    pieces::Totals& totals = result.totals;
+    static_cast<Moments&>(totals) = part.moments.along({found->normal, found->x, found->y});
+    totals.error = result.integral.error + kRoundings * DBL_EPSILON * (part.blur + volume) + kOfRules * volume +
+                   2 * found->oval * part.oval;
+    totals.border = part.border;
+    totals.unbalanced = found->along_axes(part.force + part.second_force + part.cut_force);
+    totals.open = pieces::missing(totals);
+    static_cast<Moments&>(totals) = totals.seen_from(origin);
+    return result;
+  }
+};
 
 }  // namespace
 
@@ -92,24 +143,27 @@ bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slic
   wanted.view = of.view;
   wanted.closing = true;
   wanted.volume = totals.volume, wanted.border = totals.border;
-  std::optional<Measured> found = measured(of, round, walls, wanted, false);
+  const Part whole{of, round, walls, wanted};
+  std::optional<Measured> found = whole.measured(false);
   if (!found) return false;
+  const auto keep_better = [&](std::optional<Measured> again) {
+    if (again && again->volume() > 0 && again->off() < found->off()) found = std::move(again);
+  };
   // A part of the surface may be hidden between slices of one direction.
-  if (const auto off = [](const Measured& m) { return m.totals.open + m.totals.error; };
-      found->totals.open > pieces::kMostOpen * (totals.volume + found->totals.volume))
-    if (auto other = measured(of, round, walls, wanted, true);
-        other && other->totals.volume > 0 && off(*other) < off(*found))
-      found = std::move(other);
+  if (found->totals.open > pieces::kMostOpen * (totals.volume + found->volume())) keep_better(whole.measured(true));
+  if (!(found->volume() > 0)) return true;
+  if (const double error = found->totals.error;
+      error > kFine * found->volume() && error > kFineOfAll * (totals.volume + found->volume()))
+    keep_better(whole.measured_again(*found));
   const Discs& discs = found->discs;
-  const Sums& part = found->integral.sums;
+  const Sums& part = found->sums();
   pieces::Totals more = found->totals;
-  if (!(more.volume > 0)) return true;
   more.unbalanced = discs.along_axes(part.force + part.second_force);
   more.area = part.first_area + part.second_area;
   more.first_area = part.first_area;
   more.pull = discs.along_axes(part.force);
-  more.moment = discs.moment(part.moved, of.stretch);
-  of.ball_moved = of.ball_moved + discs.moved_along_axes(part.moved);
+  more.moment = discs.moment(part.moved, of.stretch) + of.stretch.moment(found->origin, more.pull);
+  of.ball_moved = of.ball_moved + found->moved();
   of.second_force += discs.along_axes(part.second_force);
   totals.add(more);
   totals.sizes += Moments{more.volume, abs(more.first), more.squares, abs(more.products)};
