@@ -82,7 +82,7 @@ struct Measured {
 };
 
 /// The part of a round inside walls, in an ellipsoid.
-struct Part {
+struct PartOfRound {
   const InEllipsoid& of;
   const slicing::Round& round;
   std::span<const slicing::Wall> walls;
@@ -143,7 +143,7 @@ bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slic
   wanted.view = of.view;
   wanted.closing = true;
   wanted.volume = totals.volume, wanted.border = totals.border;
-  const Part whole{of, round, walls, wanted};
+  const PartOfRound whole{of, round, walls, wanted};
   std::optional<Measured> found = whole.measured(false);
   if (!found) return false;
   const auto keep_better = [&](std::optional<Measured> again) {
