@@ -67,6 +67,13 @@ MENDED = {
     "parallel cylinders as thin as rounding": ("cylinder, cylinder", 70057),
     "parallel cylinders with round ends as thin as rounding": ("capsule, cylinder", 70325),
     "rounding of two ellipsoids of other sizes": ("ellipsoid, ellipsoid", 70238),
+    "tilts of surfaces that leave a sliver": ("cylinder, ellipsoid", 100004),
+    "tilts of a flat end and an ellipsoid": ("cylinder, ellipsoid", 50008),
+    "a sliver beside its foot": ("cylinder, ellipsoid", 100062),
+    "a thin capsule far from the inner point": ("capsule, ellipsoid", 50489),
+    "chords that end just beyond a corner": ("ball, rounded hull", 10128),
+    "chords of a shallow contact that end just beyond a corner": ("ball, rounded hull", 10249),
+    "rounding of many closed forms": ("ball, mesh with margin", 200130),
     "what each of many faces may miss": ("ellipsoid, rounded hull", 80070),
     "what each of many faces of a flat rounded hull may miss": ("ellipsoid, rounded hull", 50122),
 }

@@ -26,17 +26,17 @@ std::optional<Sums> best_sums(PieceSetting setting, const Sums& none, Add add) {
     Sums again = none;
     if (add(setting, again) && off(again.totals) < off(best.totals)) best = again;
   };
-  const auto is_open = [&] { return !(open_volume(best.totals) <= kMostOpen * best.totals.volume); };
+  const auto is_off = [&] { return !(off(best.totals) <= kMostOpen * best.totals.volume); };
   // If the surface does not close, something is hidden in an interval that was sampled in its middle only. Or cuts are
-  // less accurate than the volumes on their two sides.
+  // less accurate than the volumes on their two sides. If it closes, the errors of closed forms add up.
   setting.closely = setting.cuts = true;
-  if (is_open()) try_again();
+  if (is_off()) try_again();
   // Or faces and cuts lie so near each other that only rounding orders them. They then count as one.
   const auto try_layer = [&](double part) {
     setting.layer = part * best.totals.volume / best.totals.area, setting.surface = best.totals.area;
     try_again();
   };
-  if (is_open()) try_layer(kLayer);
+  if (is_off()) try_layer(kLayer);
   if (!(off(best.totals) <= kMostError * best.totals.volume)) try_layer(kWideLayer);
   return best;
 }

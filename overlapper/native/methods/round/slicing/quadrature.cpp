@@ -120,10 +120,16 @@ class Integrating {
       if (part.area.stretched_error(part.integrals.area) > kStretchedAreaError * area_) return kHopeless;
     }
     const double area = of(part.area, part.integrals.area, area_, kAreaError, kAreaTail);
+    if (!stack_.cuts) return std::max(volume, area);
     // A volume may be accurate long before the chords of its cuts are. The surface between two pieces then does not
     // close.
-    const double cut = stack_.cuts ? of(part.cut, part.cut_area, cut_area_, kCutError, kAreaTail) : 0;
-    return std::max({volume, area, cut});
+    const double by_roots = std::pow(part.range.fall_by_roots(), 2 * static_cast<double>(part.rule.size()));
+    const auto slow = [&](const Series& series, double here, double whole) {
+      const double end = series.tail();
+      return end > rounding * here && by_roots * end > kCutError * whole ? kHopeless : 0;
+    };
+    return std::max({volume, area, of(part.cut, part.cut_area, cut_area_, kCutError, kAreaTail),
+                     slow(part.cut, part.cut_area, cut_area_), slow(part.area, part.integrals.area, area_)});
   }
 
   /// The rule with enough more nodes, or the largest one. No value if halves need fewer nodes.

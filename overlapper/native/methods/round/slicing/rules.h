@@ -105,6 +105,17 @@ class Range {
     return {place(high - step), place(low + step)};
   }
 
+  /// The ratio of one term of a series to the term before, if both come from a root just beyond an end. They may be
+  /// much smaller than the first terms, which fall faster. In x, the root is at 1 + i η. The Bernstein ellipse through
+  /// that point has the half axis (η + √(4 + η²)) / 2.
+  double fall_by_roots() const {
+    const double distance = std::min(before, after);
+    if (near != 0 || !(distance > 0 && distance < high - low)) return 0;
+    const double beside = 2 / std::numbers::pi * std::acosh(1 + 2 * distance / (high - low));
+    const double axis = (beside + std::sqrt(4 + beside * beside)) / 2;
+    return axis - std::sqrt(axis * axis - 1);
+  }
+
   bool can_be_halved() const {
     return near != 0 ? high - low > 1e-3 : high - low > 1e-14 * (std::abs(low) + std::abs(high));
   }
