@@ -78,9 +78,11 @@ struct Axes {
     xy = overlapper::dot(along_x, along_y);
   }
   static Vec3 along(Vec3 normal, Vec3 contact) {
-    const Vec3 found = contact - overlapper::dot(contact, normal) * normal;
+    const auto across = [&](Vec3 v) { return v - overlapper::dot(v, normal) * normal; };
+    const Vec3 found = across(contact);
     constexpr double kLeast = 1e-3;
-    return norm2(found) > kLeast * kLeast * norm2(contact) ? unit(found) : any_orthogonal(normal);
+    if (!(norm2(found) > kLeast * kLeast * norm2(contact))) return any_orthogonal(normal);
+    return unit(across(unit(found)));  // the first difference cancels digits
   }
   double oval() const {
     const double mean = (xx.head + yy.head) / 2;
