@@ -258,11 +258,25 @@ Region owned_as_given(Region region, const Arrangement& at) {
   return region;
 }
 
-Region grown_about(const WideBall& ball, const Arrangement& at, double reach, double tolerance) {
+/// m: bound of the movement of a body's planes by rounding in double-double.
+///
+/// Entries of a rotation are off by 28 u² at most for u = 2^-53, so a direction is off by 84 u². The products of a
+/// normal and a place, and their sum with an offset, take 28 u² more. Both are less than 2^-99. Crossings of edges and
+/// tangent planes cancel digits, but only relative to the body's own size.
+double wide_rounding_of_planes(const Placed& relative) {
+  if (only_plane(relative.shape)) return 0x1p-99 * magnitude(relative);
+  Placed own = relative;
+  own.pose.translation = {};
+  return wide_rounding(magnitude(own)) + 0x1p-99 * norm(relative.pose.translation);
+}
+
+Region grown_about(const WideBall& ball, const Arrangement& at, double tolerance) {
   const std::vector<WideBody> bodies = at.wide_bodies();
   const std::vector<Owned<WidePlane>> planes = gather_planes<WideBody>(bodies);
   const FrameAbout<WideVector> frame = round_frame<WideBody>(bodies, planes, ball.cuts, ball.centre);
-  return owned_as_given(grow<WideBody>(bodies, planes, frame, tolerance, wide_rounding(reach), at.reference), at);
+  double rounding = 0;
+  for (const Placed& body : at.relative) rounding = std::max(rounding, wide_rounding_of_planes(body));
+  return owned_as_given(grow<WideBody>(bodies, planes, frame, tolerance, rounding, at.reference), at);
 }
 
 }  // namespace
@@ -325,7 +339,7 @@ double touching_volume(std::span<const Placed> bodies, const DeepestBall& ball) 
 // ----------------------------------------------------------------------------------------------------------- measures
 
 Region grown(const Arrangement& at, const Inside& inside, double reach, double tolerance) {
-  if (inside.wide_ball) return grown_about(*inside.wide_ball, at, reach, tolerance);
+  if (inside.wide_ball) return grown_about(*inside.wide_ball, at, tolerance);
   const Frame frame = round_frame<Placed>(at.relative, inside.planes, inside.ball.cuts, inside.ball.centre);
   return owned_as_given(grow<Placed>(at.relative, inside.planes, frame, tolerance, rounding(reach), at.reference), at);
 }
@@ -355,7 +369,7 @@ std::optional<Region> grown_in_wide_arithmetic(const OverlappingBodies& overlapp
   const Arrangement& at = overlapping.at;
   const WideBall ball = wide_ball_of_overlap(at, reach, overlapping.inside().ball.cuts);
   if (!(ball.lower > 0)) return std::nullopt;
-  return grown_about(ball, at, reach, overlapping.tolerance);
+  return grown_about(ball, at, overlapping.tolerance);
 }
 
 /// The relative error of a volume; infinite if rounding has turned the polytope inside out.

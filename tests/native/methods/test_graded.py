@@ -87,6 +87,12 @@ def test_mended_contacts_state_small_errors(reason):
     assert judged.found.volume_error <= 1e-12 * judged.found.volume
 
 
+def test_a_corner_in_a_far_plane_states_a_small_error():
+    """The corner is 7e-12 m deep and 8e5 m away, where doubles are 1e-10 m apart."""
+    judged = graded.judge(graded.made("hull, half-space", 80420), True, only_volume=True)
+    assert judged.complaints == () and judged.found.volume_error <= 3e-12 * judged.found.volume
+
+
 @pytest.mark.parametrize(
     ("kinds", "seed"), [("ellipsoid, rounded hull", 10118), ("ellipsoid, mesh with margin", 10237)]
 )
