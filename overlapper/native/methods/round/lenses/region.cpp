@@ -1,6 +1,7 @@
 #include "methods/round/lenses/region.h"
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 
 #include "methods/round/lenses/polynomials.h"
@@ -36,6 +37,9 @@ void add(Region& region, Flat at, int curve) {
   if (region.corners < Region::kMostCorners) region.corner[region.corners++] = {at.x, at.y, curve};
 }
 
+/// Whether only rounding is between two points. An arc between them might as well be the whole circle, by its ends.
+bool same(Flat a, Flat b) { return norm(a - b) <= 16 * DBL_EPSILON * (norm(a) + norm(b)); }
+
 /// Cuts off what is beyond a wall.
 void clip(Region& region, int wall, Flat normal, double side) {
   std::array<std::optional<Crossings>, 2> crossings;
@@ -65,19 +69,26 @@ void clip(Region& region, int wall, Flat normal, double side) {
     const int curve = before[i].curve;
     const double of_from = side - dot(normal, from), of_to = side - dot(normal, to);
     const bool stays = of_from >= 0, ends = of_to >= 0;
-    if (stays) add(region, from, curve);
     if (curve >= 2) {
+      if (stays) add(region, from, curve);
       if (stays == ends) continue;
       const Flat at = from + (of_from / (of_from - of_to)) * (to - from);
       add(region, at, stays ? 2 + wall : curve);
       continue;
     }
+    const auto add_arc = [&](Flat begin, Flat end) {
+      if (!same(begin, end)) add(region, begin, curve);
+    };
     const Crossings& found = with(curve);
-    if (stays == ends && !(found.cross && on_arc(from, to, found.leave) && on_arc(from, to, found.enter))) continue;
+    if (stays == ends && !(found.cross && on_arc(from, to, found.leave) && on_arc(from, to, found.enter))) {
+      if (stays) add(region, from, curve);
+      continue;
+    }
     const Flat leave = found.cross ? found.leave : to, enter = found.cross ? found.enter : from;
-    if (!stays) add(region, enter, curve);
+    if (stays) add_arc(from, leave);
+    else add_arc(enter, ends ? to : leave);
     if (stays || !ends) add(region, leave, 2 + wall);
-    if (stays && ends) add(region, enter, curve);
+    if (stays && ends) add_arc(enter, to);
   }
   if (region.corners < 2) region.corners = 0;
 }
