@@ -121,6 +121,7 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
   alone.extent = std::min(pieces::extent(other, rounded(pair.inside)), pieces::extent(ellipsoid, rounded(pair.inside)));
   alone.cuts = true;
   InEllipsoid in{stretch, of_ellipsoid.rounds[0].centre, misplaced / std::min({h.x, h.y, h.z})};
+  in.parts = static_cast<int>(of_other.pieces.size());
   in.with_area = pair.with_area;
   if (pair.patch) {
     setting.view = pieces::stretched_view(pieces::PatchView(*pair.patch, 0), turn, stretch, {});

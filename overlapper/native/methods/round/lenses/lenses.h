@@ -33,6 +33,7 @@ struct InEllipsoid {
   quadric::Stretch stretch;
   WideVector centre;     ///< of the ellipsoid
   double misplaced = 0;  ///< of surfaces, by double-doubles
+  int parts = 1;         ///< of the other body, whose errors add up
   bool with_area = true;
   std::optional<View> view = {};
   double moved = 0;             ///< m: bound of the movement of surfaces by rounding, set by add_part()

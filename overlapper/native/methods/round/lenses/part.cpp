@@ -55,9 +55,9 @@ bool contains_part(const InEllipsoid& of, const slicing::Round& round, std::span
 
 namespace {
 
-/// A part with a larger error, relative to its own volume and to that of all parts, is measured again about its
-/// centroid.
-constexpr double kFine = 1e-12, kFineOfAll = 2e-14;
+/// A part is measured again about its centroid if its error is larger, relative to its own volume and to its share of
+/// all volume.
+constexpr double kFineForPart = 1e-12;
 
 /// A part by slices of one direction, about an origin.
 struct Measured {
@@ -153,7 +153,7 @@ bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slic
   if (found->totals.open > pieces::kMostOpen * (totals.volume + found->volume())) keep_better(whole.measured(true));
   if (!(found->volume() > 0)) return true;
   if (const double error = found->totals.error;
-      error > kFine * found->volume() && error > kFineOfAll * (totals.volume + found->volume()))
+      error > kFineForPart * std::max(found->volume(), (totals.volume + found->volume()) / of.parts))
     keep_better(whole.measured_again(*found));
   const Discs& discs = found->discs;
   const Sums& part = found->sums();
