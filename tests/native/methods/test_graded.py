@@ -119,6 +119,20 @@ def test_halves_state_their_errors(reason):
         assert lower - error <= volume <= upper + error and error <= 2e-12 * volume
 
 
+# Contacts whose volumes once were off by more than 1e-13 of themselves, by terms of a series that fall slowly.
+SLOW_TERMS = {
+    "a disc that ends just beyond an interval": ("ball, ellipsoid", 341992),
+    "circles that nearly touch": ("ellipsoid, ellipsoid", 340475),
+    "circles that touch just beyond an interval": ("ellipsoid, ellipsoid", 341360),
+}
+
+
+@pytest.mark.parametrize("reason", SLOW_TERMS)
+def test_rules_are_as_accurate_as_their_slowest_terms(reason):
+    judged = graded.judge(graded.made(*SLOW_TERMS[reason]), True, only_volume=True)
+    assert judged.complaints == () and judged.off < 1e-14
+
+
 # Contacts whose proved bounds once were too far apart, by what the outline of a slice left out.
 OUTLINES = {
     "a short side where a third surface cuts off a corner": ("cylinder, ellipsoid", 10416),

@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
+#include <numbers>
+#include <span>
 #include <tuple>
 
+#include "geometry/constants.h"
 #include "geometry/wide.h"
+#include "methods/round/lenses/outlines.h"
 #include "methods/round/slicing/rules.h"
 
 namespace overlapper::lenses {
@@ -16,12 +20,13 @@ using slicing::Rule;
 using slicing::Series;
 
 /// If the relative error of a rule is not larger, no finer rule follows.
-constexpr double kVolumeError = 2e-15, kAreaError = 1e-11, kBorderError = 1e-11;
+constexpr double kVolumeError = 2e-15, kSlowVolumeError = 1e-14, kAreaError = 1e-11, kBorderError = 1e-11;
 constexpr int kMostHalvings = 40;
 constexpr int kMostRules = 400;
 
 struct Part {
   Range range;
+  int nodes;
   Sums sums;
   Series volume, area, border;
 };
@@ -33,6 +38,8 @@ class Integrating {
 
   Integral run() {
     const Changes at = changes(discs_);
+    // Walls have singular places, too, which are not known away from the real line. kOfRules is for these.
+    if (discs_.cuts == 0) singular_ = std::span(at.singular.data(), at.singulars);
     std::array<Part, std::tuple_size_v<decltype(Changes::t)>> parts;
     int count = 0;
     for (int i = 0; i + 1 < at.count; ++i) {
@@ -60,7 +67,7 @@ class Integrating {
 
  private:
   Part apply(const Range& range, Rule rule) {
-    Part part{range, {}, {}, {}, {}};
+    Part part{range, 2 * static_cast<int>(rule.size()), {}, {}, {}, {}};
     ++rules_;
     for (const slicing::Node& node : rule) {
       std::array<Sums, 2> at;
@@ -84,15 +91,42 @@ class Integrating {
 
   /// The error of the volume. Where a square root lies near an interval, terms of the series fall fast at first, and
   /// then as slowly as the last two do.
-  static double error_of(const Series& series) {
+  static double error_of_series(const Part& part) {
+    const Series& series = part.volume;
     const double last = std::abs(series.last), before = std::abs(series.last_but_one);
     const double fall = last < before ? last / before : 1;
     return std::max(series.error(), series.tail() * std::pow(fall, 24));
   }
 
+  /// The error by terms that come from singular places. From the last term to the last one that the rule integrates,
+  /// they fall by as many powers of 1 / ρ. ρ is the sum of the half axes of the Bernstein ellipse in x about [-1, 1]
+  /// through the place nearest by that measure. In an end of the interval, slices are analytic in x.
+  double slow_error(const Part& part) const {
+    if (part.range.near != 0) return 0;
+    double least = kInfinity;
+    const double low = part.range.low, high = part.range.high, half = (high - low) / 2, middle = low + half;
+    for (const auto& [t, aside] : singular_) {
+      const double place = (middle - t) / half, off = aside / half;
+      const double from_low = std::hypot(place - 1, off), from_high = std::hypot(place + 1, off);
+      constexpr double kAtEnd = 1e-9, kNear = 0.2, kBeside = 1.3;  // elsewhere, ρ is 1.9 or more
+      const double nearest = std::min(from_low, from_high);
+      if (nearest <= kAtEnd || (nearest > kNear && (std::abs(place) > 1 || off > kBeside))) continue;
+      // The angle θ of the place, and x = 2 θ / π − 1.
+      const double real = std::acos(std::clamp((from_high - from_low) / 2, -1.0, 1.0)),
+                   imaginary = std::acosh(std::max(1.0, (from_high + from_low) / 2));
+      const double x = 2 / std::numbers::pi * real - 1, y = 2 / std::numbers::pi * imaginary;
+      least = std::min(least, (std::hypot(x - 1, y) + std::hypot(x + 1, y)) / 2);
+    }
+    if (!(least < kInfinity)) return 0;
+    const double fall = least - std::sqrt(std::max(0.0, least * least - 1));
+    return part.volume.tail() * std::pow(fall, part.nodes);
+  }
+
   bool enough(const Part& part) const {
     const double small = std::max(kVolumeError * volume_, 4 * DBL_EPSILON * part.sums.blur);
-    if (error_of(part.volume) > small && part.volume.tail() > 16 * DBL_EPSILON * part.sums.moments.volume) return false;
+    const bool rounded = part.volume.tail() <= 16 * DBL_EPSILON * part.sums.moments.volume;
+    if (!rounded && (error_of_series(part) > small || slow_error(part) > std::max(small, kSlowVolumeError * volume_)))
+      return false;
     if (wanted_.closing && part.border.stretched_error(part.sums.border) > kBorderError * border_ &&
         part.border.tail() > 64 * DBL_EPSILON * part.sums.border)
       return false;
@@ -109,7 +143,7 @@ class Integrating {
       }
     }
     result_.sums.add(1, part.sums);
-    result_.error += error_of(part.volume);
+    result_.error += std::max(error_of_series(part), slow_error(part));
     const double area = part.sums.first_area + part.sums.second_area;
     if (wanted_.first) result_.area_error += part.area.stretched_error(area);
   }
@@ -117,6 +151,7 @@ class Integrating {
   const Discs& discs_;
   const Wanted& wanted_;
   double volume_, border_, area_ = 0;
+  std::span<const Changes::Singular> singular_;
   int rules_ = 0;
   Integral result_;
 };

@@ -91,7 +91,7 @@ std::optional<RoundMeasures> measure_lenses(const SlicedPair& pair) {
   constexpr double kFine = 1e-12;
   if (volume > 0 && !(error <= kFine * volume)) {
     found->shared = true;
-    error = std::min(error, error_of(integrate(*found, {})) + kOfRules * volume);
+    error = std::min(error, error_of(integrate(*found, {})));
   }
   if (!(volume > 0 && error <= pieces::kMostError * volume)) return std::nullopt;
 

@@ -51,6 +51,24 @@ void add_steps(double low, double high, std::span<const double> others, Grading 
   for (double step = step_by * above; step < near * width; step *= step_by) result.add(high - step);
 }
 
+/// Finds where circles touch, where either disc ends, and where the discs are concentric. The chord has a pair of
+/// complex roots beside a bend at which it has no zero.
+void find_singular(const Discs& discs, const std::array<double, 5>& of_chord, const Roots& touching, const Roots& bends,
+                   Changes& result) {
+  const auto add = [&](double t, double square) {
+    if (std::isfinite(t) && square >= 0) result.singular[result.singulars++] = {t, std::sqrt(square)};
+  };
+  for (int i = 0; i < touching.count; ++i) add(touching.t[i], 0);
+  for (int i = 0; i < bends.count; ++i) {
+    const double t = bends.t[i], bend = of_chord[2] + t * (3 * of_chord[3] + 6 * t * of_chord[4]);
+    add(t, value(of_chord, t) / bend);
+  }
+  for (const double t : discs.ends()) add(t, 0);
+  const Quadratic apart = dot(discs.apart, discs.apart);
+  const double middle = -apart[1] / (2 * apart[2]);
+  add(middle, std::max(0.0, apart[0] / apart[2] - middle * middle));
+}
+
 }  // namespace
 
 /// The half chord h has 4 d² h² = 4 (e × μ)² + 4 (S d² + D e·μ) − D², with e from the first centre to the second, d
@@ -74,6 +92,7 @@ Changes changes(const Discs& discs) {
   Roots bends;
   const Roots touching = roots<4>(of_chord, low, high, &bends);
   for (int i = 0; i < touching.count; ++i) result.add(touching.t[i]);
+  find_singular(discs, of_chord, touching, bends, result);
   // If the circles nearly touch, or coincide, outlines change within a short interval.
   for (int i = 0; i < bends.count; ++i) {
     const double t = bends.t[i];

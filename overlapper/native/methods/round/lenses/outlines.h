@@ -15,6 +15,13 @@ struct Changes {
   std::array<double, kMostChanges> t;
   int count = 0;
 
+  /// A place t ± i `aside` where the common part of both discs is not analytic in t.
+  struct Singular {
+    double t, aside;
+  };
+  std::array<Singular, 12> singular;
+  int singulars = 0;
+
   void add(double at) {
     if (count == kMostChanges) sort();
     if (count < kMostChanges) t[count++] = at;
