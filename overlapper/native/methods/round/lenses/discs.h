@@ -109,7 +109,6 @@ struct Discs {
   double second_area = 0;  ///< m² of the second surface per angle and t, if that is constant
   std::array<Cut, kMostCuts> cut;
   int cuts = 0;
-  bool shared = false;                    ///< the discs share the rounding of sizes, as they do if there are walls
   std::array<std::optional<Cut>, 2> end;  ///< walls parallel to the slices, at the low and at the high end
 
   /// A vector across the slices and in their plane, along the axes of the first body.

@@ -84,15 +84,7 @@ std::optional<RoundMeasures> measure_lenses(const SlicedPair& pair) {
   const Integral integral = integrate(*found, wanted);
   const Sums& sums = integral.sums;
   const double volume = sums.moments.volume;
-  const auto error_of = [&](const Integral& of) {
-    return of.error + kRoundings * DBL_EPSILON * (of.sums.blur + volume) + 2 * found->oval * of.sums.oval;
-  };
-  double error = error_of(integral);
-  constexpr double kFine = 1e-12;
-  if (volume > 0 && !(error <= kFine * volume)) {
-    found->shared = true;
-    error = std::min(error, error_of(integrate(*found, {})));
-  }
+  const double error = integral.error + kRoundings * DBL_EPSILON * (sums.blur + volume) + 2 * found->oval * sums.oval;
   if (!(volume > 0 && error <= pieces::kMostError * volume)) return std::nullopt;
 
   RoundMeasures result;

@@ -24,7 +24,8 @@ std::optional<pieces::RoundMeasures> measure_in_parts(const pieces::SlicedPair& 
 
 /// The rounding of all terms of a slack, and of all sums of slices, in units of the last bit.
 inline constexpr double kRoundings = 16;
-/// The error of the rules, of the volume, may be larger than their series tell; no error above half of it was seen.
+/// The error of the rules for a part that walls cut, of its volume. Singular places of the walls are unknown away from
+/// the real line. No error above half of this was seen.
 inline constexpr double kOfRules = 2e-13;
 
 /// An ellipsoid that the parts of another body are cut with. Coordinates are along the ellipsoid's axes, in units of

@@ -188,8 +188,7 @@ Flat turned(Flat ahead, Flat sizes) {
 /// of that distance stretches or twists these axes. Places are at most `reach` from the middle of the chord.
 ///
 /// The mean disc divides both the difference of the slacks and the distance of the centres. A disc that is much smaller
-/// than the other has a small part of both, and little of their rounding. Bodies without walls have the wider bound of
-/// whole sizes at first, which covers the rules, too.
+/// than the other has a small part of both, and little of their rounding.
 struct Terms {
   std::array<double, 2> slack, centre, aside;  ///< of the first disc and of the second
   double square;                               ///< of the distance of places from the foot
@@ -198,24 +197,19 @@ Terms terms_of_lens(const Place& place, Flat reach) {
   const Discs& d = place.discs;
   const Section& s = place.section;
   const double t = place.t, chord = std::abs(s.chord), aside = std::abs(s.aside);
-  const bool shared = d.cuts > 0 || d.shared;
-  const auto own = [&](const Line& line) {
-    const Flat sizes = sizes_at(line, t);
-    return shared ? turned(s.ahead, sizes) : (sizes.x + sizes.y) * Flat{1, 1};
-  };
-  const Flat away = Flat{chord, aside} + reach, middle = d.centre.at(t), centres = own(d.centre),
-             between = own(d.apart);
+  const Flat away = Flat{chord, aside} + reach, middle = d.centre.at(t),
+             centres = turned(s.ahead, sizes_at(d.centre, t)), between = turned(s.ahead, sizes_at(d.apart, t));
   const double apart = norm(d.apart.at(t)), stretch = between.x / apart, twist = between.y / apart;
   const double along = std::abs(dot(s.ahead, middle)), lever = along + chord, difference = size_at(d.difference, t);
   const double square = dot(away, away);
   const double slack = size_at(d.slack, t) + difference * lever / apart + square + d.misplaced +
                        2 * aside * (centres.y + along * twist) +
                        2 * chord * (centres.x + aside * twist + lever * stretch);
-  const double centre = centres.x + chord * stretch + (shared ? chord + aside * twist : 0);
+  const double centre = centres.x + aside * twist + chord * (1 + stretch);
   Terms terms{{}, {}, {}, square};
   for (const int k : {0, 1}) {
-    const double share = k == 0 ? d.share : 1 - d.share, part = shared ? share : 1;
-    terms.slack[k] = slack + part * difference, terms.centre[k] = centre + part * between.x;
+    const double share = k == 0 ? d.share : 1 - d.share;
+    terms.slack[k] = slack + share * difference, terms.centre[k] = centre + share * between.x;
     terms.aside[k] = centres.y + along * twist + share * between.y;
   }
   return terms;
