@@ -66,9 +66,6 @@ MENDED = {
     "tilts of a flat end and an ellipsoid": ("cylinder, ellipsoid", 50008),
     "a sliver beside its foot": ("cylinder, ellipsoid", 100062),
     "a thin capsule far from the inner point": ("capsule, ellipsoid", 50489),
-    "chords that end just beyond a corner": ("ball, rounded hull", 10128),
-    "chords of a shallow contact that end just beyond a corner": ("ball, rounded hull", 10249),
-    "rounding of many closed forms": ("ball, mesh with margin", 200130),
     "what each of many faces may miss": ("ellipsoid, rounded hull", 80070),
     "what each of many faces of a flat rounded hull may miss": ("ellipsoid, rounded hull", 50122),
 }
@@ -80,6 +77,22 @@ def test_mended_contacts_state_small_errors(reason):
     judged = graded.judge(contact, False, only_volume=True)
     assert judged.complaints == () and judged.found.way == "slicing"
     assert judged.found.volume_error <= 1e-12 * judged.found.volume
+
+
+# Likewise, but a closed form gives the volume, and slices the area.
+MENDED_SLICES = {
+    "chords that end just beyond a corner": ("ball, rounded hull", 10128),
+    "chords of a shallow contact that end just beyond a corner": ("ball, rounded hull", 10249),
+    "rounding of many closed forms": ("ball, mesh with margin", 200130),
+}
+
+
+@pytest.mark.parametrize("reason", MENDED_SLICES)
+def test_mended_slices_beside_a_closed_form_state_small_errors(reason):
+    contact = graded.made(*MENDED_SLICES[reason])
+    found = graded.judge(contact, False, only_volume=True).found
+    assert found.way == "closed form" and found.volume_error <= 1e-12 * found.volume
+    assert found.errors.area <= 1e-12 * found.area
 
 
 def test_a_corner_in_a_far_plane_states_a_small_error():
