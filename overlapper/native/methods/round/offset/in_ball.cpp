@@ -50,7 +50,11 @@ struct Turns {
   }
   /// Counts how often the line crosses the negative x axis.
   void pass(Flat from, Flat to) {
-    if ((from.y > 0) == (to.y > 0)) return;
+    if ((from.y > 0) == (to.y > 0)) {
+      // Along the x axis, it turns by half as angle() says: above the middle, and then onto the negative axis.
+      if (from.y == 0 && to.y == 0 && from.x > 0 && to.x < 0) ++around;
+      return;
+    }
     const double side = cross(from, to);
     if (from.y > 0 && side >= 0) ++around;
     if (to.y > 0 && side < 0) --around;
