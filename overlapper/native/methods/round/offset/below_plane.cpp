@@ -369,8 +369,9 @@ std::optional<VolumeAlone> volume_below_plane(const Placed& rounded_hull, const 
   const Plane plane = flat.pose * overlapper::facet(flat.shape, facet);
   Vec3 normal = apply_transposed(rounded_hull.pose.rotation, plane.normal);
   const double offset = -signed_distance(plane, rounded_hull.pose.translation);
-  double off = rounding(std::abs(plane.offset) + norm(flat.pose.translation) + reach(flat.shape) +
-                        norm(rounded_hull.pose.translation) + reach(rounded_hull.shape));
+  const double size = std::abs(plane.offset) + norm(flat.pose.translation) + reach(flat.shape) +
+                      norm(rounded_hull.pose.translation) + reach(rounded_hull.shape);
+  double off = rounding(reach(rounded_hull, reach(flat, size)));
   const Scratch<Work> work;
   work->corners.assign(hull.vertices.size(), {});
   double lowest = kInfinity;
