@@ -88,6 +88,7 @@ struct BallEdge {
   double depth = 0;            ///< R + r − distance
   double from2 = 0, to2 = 0;   ///< m²: R² − ρ² where the band's lines nearest to the centre end
   double left = 0, right = 0;  ///< angles ψ of the facets' normals, if `exact`
+  double off = 1;              ///< rounding of the direction to the centre, in units of `kOfDirections`
   bool exact = false;
 };
 
@@ -310,7 +311,7 @@ class InBall {
       for (End& one : ends) {
         if (one.anchored && !one.whole)
           add_part(one.corner.turns, one.side, one.flats[0], one.flats[1], one.flats[0], one.flats[1]);
-        add_bounds(one, start, end, d);
+        add_bounds(one, start, end, d, edge.off);
       }
       area_ += r * own.angle * own.length;
       return true;
@@ -371,7 +372,7 @@ class InBall {
           add_part(one.corner.turns, one.side, begin > low || !from_left ? seen(begin_psi) : one.flats[0],
                    stop < high || !to_right ? seen(stop_psi) : one.flats[1], one.flats[0], one.flats[1]);
         }
-        add_bounds(one, begin_psi, stop_psi, d);
+        add_bounds(one, begin_psi, stop_psi, d, edge.off);
         if (!astride && one.sign > 0) area_ += r * (stop_psi - begin_psi) * (std::sqrt(chord2) - away);
       }
     }
@@ -447,10 +448,10 @@ class InBall {
     return {first - second + third, std::abs(first) + std::abs(second) + std::abs(third)};
   }
 
-  void add_bounds(const End& end, double begin, double stop, double d) {
+  void add_bounds(const End& end, double begin, double stop, double d, double off) {
     const double least = begin < 0 && stop > 0 ? 0 : std::sin(std::min(std::abs(begin), std::abs(stop)) / 2);
     const double nearest2 = (d - r_) * (d - r_) + 4 * d * r_ * least * least + end.z * end.z;
-    tilted_ += r_ * r_ * (stop - begin) * most_at(std::sqrt(nearest2));
+    tilted_ += off * r_ * r_ * (stop - begin) * most_at(std::sqrt(nearest2));
     end.corner.turns.most = std::max(end.corner.turns.most, ball_ * ball_ - nearest2);
   }
 
@@ -466,8 +467,8 @@ class InBall {
     const double q2 = gap * gap + moved, inner = side * d * std::sin(psi);  // from the side to the foot
     const double s0 = facet.slack, near = facet.near, inner2 = inner * inner;
     const double nearest2 = low < 0 && high > 0 ? 0 : std::min(low * low, high * high);
-    tilted_ +=
-        (edge.exact ? d * std::abs(std::sin(psi)) + r_ : d + r_) * (high - low) * most_at(std::sqrt(q2 + nearest2));
+    tilted_ += edge.off * (edge.exact ? d * std::abs(std::sin(psi)) + r_ : d + r_) * (high - low) *
+               most_at(std::sqrt(q2 + nearest2));
     facet.turns.most = std::max(facet.turns.most, chord2 - nearest2);
     if (inner < 0)
       facet.turns.segment = std::min(facet.turns.segment, 2 * chord2 * chord / (-inner + std::sqrt(inner2 + chord2)));
@@ -536,7 +537,8 @@ class InBall {
       if (turns.around < 0) {
         // The normals are all around the direction away from the centre. The flux through the whole sphere is added.
         const double rho = ball_ - far;
-        const double factor = 2 * kPi * (s - far) / (rho * near * 6 * corner.distance);
+        // R − ρ falls by the smaller of both diameters.
+        const double factor = 2 * kPi * std::min(1.0, r_ / corner.distance) / (rho * near * 3);
         flux_.add(fall(corner, far, rho), factor);
       }
     } else {
@@ -648,6 +650,7 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
     BallCorner &from = work->corners[own.from], &to = work->corners[own.to];
     if (!wide_too) {
       edge.depth = sum - edge.distance;
+      edge.off = std::max(1.0, std::max(from.distance, to.distance) / edge.distance);
       const double chord2 = edge.depth * (radius - r + edge.distance);
       edge.from2 = chord2 - edge.from * edge.from, edge.to2 = chord2 - edge.to * edge.to;
       continue;
