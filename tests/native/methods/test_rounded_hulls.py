@@ -198,3 +198,16 @@ def test_other_measures_agree_with_the_volume():
         assert (then.volume, then.volume_error, then.way) == (volume, first.volume_error, first.way)
         found = pair(rng, kind)
         assert found.errors.volume == found.volume_error
+
+
+def test_points_far_from_the_origin_of_their_body_keep_their_digits():
+    """The body's position takes its points back to the plane."""
+    rng = np.random.default_rng(17)
+    for _ in range(20):
+        near = np.round(rng.normal(size=(8, 3)) * 2**20) / 2**20
+        far = np.round(rng.normal(size=3) * 2**45) / 2**25
+        plane = HalfSpace(rng.normal(size=3), 0.1)
+        expected = overlap(RoundedHull(near, 0.125), plane)
+        # Neither sum nor difference rounds. The origin of the hull's data plus the position does.
+        found = overlap(Placed(RoundedHull(near + far, 0.125), -far), plane)
+        assert abs(found.volume - expected.volume) <= found.volume_error + expected.volume_error

@@ -241,3 +241,51 @@ def test_other_measures_agree_with_the_volume():
     volume = first.volume
     assert then.centroid.shape == (3,)
     assert (then.volume, then.volume_error, then.way) == (volume, first.volume_error, first.way)
+
+
+AROUND = HalfSpace([0.36, 0.48, 0.8], 100)  # holds all bodies: with it, a pair is sliced
+
+
+def rotated(turn, point):
+    axis, w = np.array(turn[:3], float), turn[3]
+    twice = 2 * np.cross(axis, point)
+    return point + (w * twice + np.cross(axis, twice)) / (axis @ axis + w * w)
+
+
+def agrees_with_slices(body, ball):
+    found, sliced = overlap(body, ball), overlap(body, ball, AROUND)
+    assert abs(found.volume - sliced.volume) <= found.volume_error + sliced.volume_error
+
+
+@pytest.mark.parametrize(
+    "centre",
+    [
+        (0.0, 0.25, 0.0),  # in the plane of a face
+        (0.1, 0.25, 0.125),  # on an edge
+        (0.75, 0.25, 0.125),  # on the line of an edge
+        (0.5, 0.25, 0.125),  # at a corner
+        (0.5 + 2.0**-53, 0.25 - 2.0**-54, 0.125),
+        (0.5 + 1e-13, 0.25, 0.125 - 1e-13),
+        (0.0, 0.25 + 2.0**-4, 0.0),  # on the surface
+        (0.0, 0.0, 0.125 + 2.0**-4),
+    ],
+)
+@pytest.mark.parametrize("radius", [2.0**-7, 0.2, 0.3, 0.7])
+@pytest.mark.parametrize("turn", TURNS)
+def test_centres_on_planes_edges_and_corners(centre, radius, turn):
+    agrees_with_slices(rounded_box(2.0**-4, turn=turn), Placed(Sphere(radius), rotated(turn, np.array(centre))))
+
+
+@pytest.mark.parametrize("radius", [0.6283786413514381, 1.25])
+@pytest.mark.parametrize("centre", [(0, 0.7567572827028762, 0), (0, 1.5, 0), (1.25, 0, 0), (0, 0, -0.4)])
+def test_centres_on_lines_of_edges_of_a_simplex(radius, centre):
+    simplex = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]]
+    agrees_with_slices(Placed(RoundedHull(simplex, 0.5)), Placed(Sphere(radius), centre))
+
+
+@pytest.mark.parametrize("radius", [2.0**-4, 2.0, 52.0])
+@pytest.mark.parametrize("above", [1e-14, 1e-12, 1e-10])
+def test_facets_that_are_nearly_one_plane(radius, above):
+    corners = np.vstack([CUBE_CORNERS, CUBE_CORNERS * [0.5, 0.5, 1 + above]])
+    for centre in [(0, 0, 1.0), (0.5, 0.5, 1.25), (0.25, 1, 1), (1, 1, 1), (0.1, 0.2, 1 + radius)]:
+        agrees_with_slices(Placed(RoundedHull(corners, 0.25)), Placed(Sphere(radius), centre))

@@ -452,7 +452,13 @@ class InBall {
     const double least = begin < 0 && stop > 0 ? 0 : std::sin(std::min(std::abs(begin), std::abs(stop)) / 2);
     const double nearest2 = (d - r_) * (d - r_) + 4 * d * r_ * least * least + end.z * end.z;
     tilted_ += off * r_ * r_ * (stop - begin) * most_at(std::sqrt(nearest2));
-    end.corner.turns.most = std::max(end.corner.turns.most, ball_ * ball_ - nearest2);
+    BallCorner& corner = end.corner;
+    corner.turns.most = std::max(corner.turns.most, ball_ * ball_ - nearest2);
+    if (!end.with_arc || end.anchored) return;
+    // The angle of an arc loses more, the nearer it passes to the direction to the centre.
+    const double across = begin < 0 && stop > 0 ? 0 : std::min(std::abs(std::sin(begin)), std::abs(std::sin(stop)));
+    const double passed = std::sqrt(end.z * end.z + d * d * across * across);
+    tilted_ += off * cap(corner, corner.slack, corner.near).size / (6 * corner.near * passed);
   }
 
   /// Adds a side of a moved facet, where it is a band's border at ψ. From first to last, the facet is on the left.
@@ -627,6 +633,7 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
     }
     if (foot) nearest = std::min(nearest, highest);
   }
+  if (highest > 0 && std::abs(nearest - r) <= doubtful) return std::nullopt;
   const bool inside = highest <= 0 || nearest < r;
   const double depth = inside ? radius : sum - nearest;
 
@@ -665,6 +672,9 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
     edge.distance = line.head, edge.depth = deep.head, edge.from = first.head, edge.to = last.head;
     edge.from2 = (chord2 - first * first).head, edge.to2 = (chord2 - last * last).head;
     edge.exact = true;
+    // The line of the edge loses 2^-98 of its distance from the ends, squared, over its distance from the centre.
+    const double slant = std::max(from.distance, to.distance) / edge.distance;
+    edge.off = std::max(1.0, 0x1p-48 * slant * slant);
     const auto angle_of = [&](int f) {
       const BallFacet& facet = work->facets[f];
       if (facet.plane < 0) {
