@@ -2,6 +2,7 @@
 
 import numpy as np
 import pybullet
+import pybullet_data
 import pytest
 from simulated import box, ground, jointed
 
@@ -192,6 +193,32 @@ def test_a_restored_state_forgets_everything_that_came_after_it(client):
             ways.append(pybullet.getBasePositionAndOrientation(box, physicsClientId=client))
     assert ways[0] == ways[1]
     assert np.abs(_speed(client, box)).max() < 1e-9
+
+
+def test_forces_are_settled_from_a_first_guess_that_is_far_too_large(client):
+    """Stiffness times volume would throw the tip of the arm at 9e5 m/s. The residual is over slips of the solution."""
+    ground(client)
+    path = f"{pybullet_data.getDataPath()}/kuka_iiwa/model.urdf"
+    arm = pybullet.loadURDF(path, useFixedBase=True, physicsClientId=client)
+    for joint, angle in enumerate([0.1, 1.9, 0.05, -0.1, 0.02, 0.3, 0]):
+        pybullet.resetJointState(arm, joint, angle, 0.1, physicsClientId=client)
+    contact = VolumetricContact(Bodies(client), substeps=1)
+    first, second = contact.forces(), contact.forces()
+    assert first.residual <= 1e-8 and np.abs(first.force).max() > 100
+    np.testing.assert_allclose(first.force, second.force, atol=1e-5 * np.abs(second.force).max())
+
+
+@pytest.mark.parametrize("stiffness", [1e7, 1e9])
+def test_bodies_squeezed_at_rest_without_gravity_are_settled_to_rounding(client, stiffness):
+    """No slip is left, so that slips are rounding of what the forces do alone."""
+    for x in (-0.0999, 0.5999):
+        box(client, 0.05, mass=0, position=[x, 0, 0])
+    for k in range(6):
+        _box(client, [0.0999 * k, 0, 0])
+    with VolumetricContact(Bodies(client), stiffness=stiffness) as contact:
+        for _ in range(240):
+            contact.step()
+            assert contact.residual <= 1e-8 and contact.sweeps < 100
 
 
 def _tumbling(client):

@@ -45,6 +45,9 @@ constexpr int kFewCoordinates = 60;
 /// A search along a step ends when the power is less than this part of the power at its beginning.
 constexpr double kSearched = 0.1;
 
+/// Slips are sums of what wrenches do alone. They are right to this share of the largest term.
+constexpr double kRounding = 64 * 0x1p-52;
+
 /// The axis of a rotation times its angle in rad. NaN above a third of a turn, where rounding would matter.
 Vec3 rotation_vector(const Mat3& turn) {
   const Vec3 twice{turn.row2.y - turn.row1.z, turn.row0.z - turn.row2.x, turn.row1.x - turn.row0.y};
@@ -473,6 +476,13 @@ double ContactSolver::largest_change(const Row& row, const Laws& laws, const Six
   return duration * std::max({std::abs(n[0]), std::abs(t[0]), std::abs(t[1]), turned});
 }
 
+/// The slip of a patch in m/s, or the speed that a constraint misses.
+double ContactSolver::speed(const Row& row, const Laws& laws, std::span<const double> velocity) const {
+  const Six slip = slip_of(row, velocity);
+  if (laws.constraint) return laws.constraint->missing(numbers(slip));
+  return std::max({std::abs(slip.normal[0]), std::abs(slip.tangential[0]), std::abs(slip.tangential[1])});
+}
+
 SixNumbers ContactSolver::numbers(const Six& of) {
   const Three &n = of.normal, &t = of.tangential;
   return {n[0], n[1], n[2], t[0], t[1], t[2]};
@@ -861,8 +871,13 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
       const int i = island.rows[ended.sweeps % 2 ? count - 1 - k : k];
       changed = std::max(changed, visit(i, laws[i], duration, velocity));
     }
-    ++ended.sweeps;
-    largest = std::max(largest, changed);  // bodies may be at rest until they are pushed
+    // Bodies may be at rest until they are pushed. What the first sweep takes back of wrenches that were too large may
+    // be much more than any slip.
+    if (++ended.sweeps == 1)
+      for (int i : island.rows) {
+        const double pushed = largest_change(rows_[i], laws[i], laws[i].wrench, duration);
+        largest = std::max({largest, speed(rows_[i], laws[i], velocity), kRounding / kSettled * pushed});
+      }
     if (changed <= step.settled * largest) break;
     if (!small && ended.sweeps >= kAlone && ended.sweeps % 2 == 0 && ended.sweeps + 2 <= most &&
         step.friction == Friction::kEllipsoid)
@@ -1002,12 +1017,7 @@ ContactSolver::Solution ContactSolver::solve_patches(const Step& step, std::vect
     if (last != known_held_.end()) law.wrench = last->wrench;
   }
   std::vector<double> free;
-  for (size_t i = 0; i < rows_.size(); ++i) {
-    const Six slip = slip_of(rows_[i], velocity);
-    const double sliding = std::max(std::abs(slip.tangential[0]), std::abs(slip.tangential[1]));
-    free.push_back(laws[i].constraint ? laws[i].constraint->missing(numbers(slip))
-                                      : std::max(std::abs(slip.normal[0]), sliding));
-  }
+  for (size_t i = 0; i < rows_.size(); ++i) free.push_back(speed(rows_[i], laws[i], velocity));
   for (int i = 0; i < count; ++i) push(rows_[i], laws[i].wrench, h, velocity);
   Ended all;
   for (const Island& island : islands()) {

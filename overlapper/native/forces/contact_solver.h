@@ -27,8 +27,8 @@ struct PatchForce {
 /// Gauss–Seidel), and all those of bodies that are connected at once (Newton's method) until nothing changes.
 class ContactSolver {
  public:
-  /// Sweeps end when no slip changes by more than this fraction of the largest slip without forces, or of the largest
-  /// change of a sweep.
+  /// Sweeps end when no slip changes by more than this fraction of the largest slip without forces, or after the first
+  /// sweep.
   static constexpr double kSettled = 1e-8;
 
   explicit ContactSolver(Multibodies bodies) : bodies_(std::move(bodies)) {}
@@ -209,6 +209,7 @@ class ContactSolver {
   std::vector<double> forces_on_coordinates(int body, const Solution& solution) const;
   double visit(size_t index, Laws& laws, double duration, std::span<double> velocity) const;
   double largest_change(const Row& row, const Laws& laws, const Six& change, double duration) const;
+  double speed(const Row& row, const Laws& laws, std::span<const double> velocity) const;
   Solution solved(std::span<const Laws> laws, std::span<const double> velocity) const;
   void remember(const Solution& solution, std::span<const Laws> laws, double duration);
 
