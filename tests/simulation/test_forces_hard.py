@@ -1,10 +1,12 @@
 """Hard cases of volumetric contact: light, fast or stiff bodies, and scripts that change a simulation between steps."""
 
+import warnings
+
 import numpy as np
 import pybullet
 import pybullet_data
 import pytest
-from simulated import box, ground, jointed
+from simulated import body, box, ground, jointed
 
 from overlapper.simulation import Bodies, Recorder, VolumetricContact
 
@@ -219,6 +221,21 @@ def test_bodies_squeezed_at_rest_without_gravity_are_settled_to_rounding(client,
         for _ in range(240):
             contact.step()
             assert contact.residual <= 1e-8 and contact.sweeps < 100
+
+
+@pytest.mark.parametrize("substeps", ["auto", 4, 16])
+@pytest.mark.parametrize("depth", [0.0, 0.05, 0.09])
+def test_a_swallowed_body_leaves_no_faster_than_by_its_size_in_the_time_of_recovery(client, substeps, depth):
+    """A ball within a box. As it comes out, its overlap is deep and the area of its patch is small."""
+    box(client, 0.1, mass=0, position=[0, 0, 0])
+    ball = body(client, pybullet.GEOM_SPHERE, radius=0.05, mass=0.2, position=[0.02, 0.01, depth])
+    size = (4 / 3 * np.pi) ** (1 / 3) * 0.05
+    with warnings.catch_warnings(), VolumetricContact(Bodies(client), substeps=substeps) as contact:
+        warnings.simplefilter("ignore")
+        for _ in range(60):
+            contact.step()
+            assert np.linalg.norm(_speed(client, ball)) < 1.01 * size / 0.02
+    assert not len(contact)
 
 
 def _tumbling(client):

@@ -112,6 +112,14 @@ def resisted(world, **laws):
     return stepping(world, 2, **laws)
 
 
+def sunk(world, **laws):
+    """A needle that is deeper in the ground than it is wide."""
+    turn = p.getQuaternionFromEuler([0.05, 0.03, 0.2])
+    needle = world.box(0.01, 0.01, 0.15, position=[0, 0, 0.1], orientation=turn)
+    world.push(needle, [0.04, 0.01, -0.05], [0.05, 0.1, 0.2])
+    return stepping(world, 1, **laws)
+
+
 def rebounding(world):
     cube = world.box(*[HALF] * 3, position=[0, 0, 0.09], orientation=POSES["skew"])
     for id in (cube, world.plane):
@@ -171,7 +179,7 @@ def hardening(world, **laws):
     return tumbling(world, then=1, hardening=500, **laws)
 
 
-SCENES = [resting, leaning, sliding, tumbling, bouncing, stacked, in_parts, ball, resisted, arm, panda, hardening]
+SCENES = [resting, leaning, sliding, tumbling, bouncing, stacked, in_parts, sunk, ball, resisted, arm, panda, hardening]
 
 
 @pytest.mark.parametrize("law", LAWS)

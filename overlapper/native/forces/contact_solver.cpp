@@ -150,6 +150,12 @@ void ContactSolver::make_rows(const Step* step) {
 /// have the same normal: a body that consists of parts moves like a whole body. The damping follows the mean of their
 /// slips, weighted by their forces. This is the slip at the centroid of the whole volume.
 void ContactSolver::share_damping() {
+  // A body leaves the other one with the size of the overlap over the time of recovery at most, also where the patch is
+  // small: a body that is about to be swallowed has a deep overlap with a small patch.
+  const auto leaving = [&](int i) {
+    const double size = std::cbrt(patches_[i].volume);
+    return std::max(rows_[i].area.area, size * size);
+  };
   std::map<std::pair<int, int>, std::vector<int>> of_links;
   for (int i = 0; i < int(patches_.size()); ++i) {
     const ElasticPatch& patch = patches_[i];
@@ -157,9 +163,7 @@ void ContactSolver::share_damping() {
     if (patch.area > 0) {
       of_links[{patch.link_a, patch.link_b}].push_back(i);
     } else {
-      // A body without a direction leaves the other one with its own size over the time of recovery at most.
-      const double size = std::cbrt(patch.volume);
-      rows_[i].damping = patch.recovery * patch.stiffness * size * size;
+      rows_[i].damping = patch.recovery * patch.stiffness * leaving(i);
     }
   }
   for (const auto& [links, group] : of_links) {
@@ -169,7 +173,7 @@ void ContactSolver::share_damping() {
       for (int j : group) {
         const ElasticPatch& other = patches_[j];
         const double same = j == i ? 1 : std::max(0.0, overlapper::dot(patches_[i].normal, other.normal));
-        stiffness += same * other.stiffness * (rows_[j].area.area + other.hardened);
+        stiffness += same * other.stiffness * (leaving(j) + other.hardened);
         force += same * other.force;
         if (j != i && same > 0) shares.push_back({j, same * other.force});
       }

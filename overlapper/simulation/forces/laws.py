@@ -319,7 +319,9 @@ class LinkLaws:
         same = np.where(same.real > 0, same, 0)
         same = np.where(np.eye(len(together), dtype=bool), 1.0, same)
         same = np.where(together[:, None] & together, same, 0)
-        slope = stiffness * (area + 2 * f.hardening * of.volume)
+        volume = np.where(of.volume.real > 0, of.volume, 1.0)
+        wide = np.where(area.real > volume.real ** (2 / 3), area, volume ** (2 / 3))
+        slope = stiffness * (wide + 2 * f.hardening * of.volume)
         stiff, total = np.einsum("dgk,dk->dg", same, slope), np.einsum("dgk,dk->dg", same, force)
         total = np.where(together, total, 1)
         found = (f.recovery * stiff * force / total**2)[..., None] * same * force[:, None]
