@@ -210,6 +210,19 @@ def test_forces_are_settled_from_a_first_guess_that_is_far_too_large(client):
     np.testing.assert_allclose(first.force, second.force, atol=1e-5 * np.abs(second.force).max())
 
 
+def test_forces_are_settled_after_a_first_sweep_that_throws_a_body(client):
+    """The first forces on the lower box still know an upper box that is pressed too hard."""
+    pybullet.setGravity(0, 0, -G, physicsClientId=client)
+    ground(client)
+    _box(client, [0, 0, 0.0999], half=0.1)
+    _box(client, [0.02, 0, 0.2495], mass=0.3)
+    contact = VolumetricContact(Bodies(client), substeps=1)
+    forces = [contact.forces() for _ in range(2)]
+    for found in forces:
+        assert found.residual <= 1e-8
+    np.testing.assert_allclose(forces[0].force, forces[1].force, atol=1e-5 * np.abs(forces[1].force).max())
+
+
 @pytest.mark.parametrize("stiffness", [1e7, 1e9])
 def test_bodies_squeezed_at_rest_without_gravity_are_settled_to_rounding(client, stiffness):
     """No slip is left, so that slips are rounding of what the forces do alone."""

@@ -865,6 +865,15 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
   int unknowns = 0;
   for (int body : island.bodies) unknowns += bodies_.bodies()[body].coordinates;
   const bool small = unknowns > 0 && unknowns <= kUnknowns;
+  // Bodies may be at rest until they are pushed.
+  const auto fastest = [&, free = largest] {
+    double found = free;
+    for (int i : island.rows) {
+      const double pushed = largest_change(rows_[i], laws[i], laws[i].wrench, duration);
+      found = std::max({found, speed(rows_[i], laws[i], velocity), kRounding / kSettled * pushed});
+    }
+    return found;
+  };
   double changed = 0;
   Momentum momentum;
   for (const int most = std::clamp(kVisits / count, kFewest, kMost); ended.sweeps < most;) {
@@ -875,14 +884,9 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
       const int i = island.rows[ended.sweeps % 2 ? count - 1 - k : k];
       changed = std::max(changed, visit(i, laws[i], duration, velocity));
     }
-    // Bodies may be at rest until they are pushed. What the first sweep takes back of wrenches that were too large may
-    // be much more than any slip.
-    if (++ended.sweeps == 1)
-      for (int i : island.rows) {
-        const double pushed = largest_change(rows_[i], laws[i], laws[i].wrench, duration);
-        largest = std::max({largest, speed(rows_[i], laws[i], velocity), kRounding / kSettled * pushed});
-      }
-    if (changed <= step.settled * largest) break;
+    if (++ended.sweeps == 1) largest = fastest();
+    // What the first sweep left may be much more than any slip of the solution.
+    if (changed <= step.settled * largest && changed <= step.settled * (largest = fastest())) break;
     if (!small && ended.sweeps >= kAlone && ended.sweeps % 2 == 0 && ended.sweeps + 2 <= most &&
         step.friction == Friction::kEllipsoid)
       extrapolate(momentum, island, laws, duration, velocity);

@@ -27,8 +27,7 @@ struct PatchForce {
 /// Gauss–Seidel), and all those of bodies that are connected at once (Newton's method) until nothing changes.
 class ContactSolver {
  public:
-  /// Sweeps end when no slip changes by more than this fraction of the largest slip without forces, or after the first
-  /// sweep.
+  /// Sweeps end when no slip changes by more than this fraction of the largest slip, without forces or with them.
   static constexpr double kSettled = 1e-8;
 
   explicit ContactSolver(Multibodies bodies) : bodies_(std::move(bodies)) {}

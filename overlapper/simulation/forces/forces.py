@@ -53,8 +53,9 @@ class Forces(Tabular):
         Returns position and quaternion xyzw of the frame of a link (body, link), at the time of the contacts.
     residual : float, default 0
         How much a slip would still change if each pair was solved again by itself, as a fraction of the largest slip
-        without forces. Each group of bodies that touch each other has its own largest slip. The residual is that of the
-        worst group. It is at most 1e-8 if the forces are settled. In a mean, it is the largest of all substeps.
+        without forces or with them. Each group of bodies that touch each other has its own largest slip. The residual
+        is that of the worst group. It is at most 1e-8 if the forces are settled. In a mean, it is the largest of all
+        substeps.
     """
 
     contacts: Contacts
