@@ -45,8 +45,8 @@ constexpr int kFewCoordinates = 60;
 /// A search along a step ends when the power is less than this part of the power at its beginning.
 constexpr double kSearched = 0.1;
 
-/// Slips are sums of what wrenches do alone. Changes below this share of the largest term count as rounding:
-/// elimination in chains of stiff contacts loses five digits.
+/// Slips are sums of what wrenches do alone. Changes below this share of the largest term count as rounding. Six stiff
+/// contacts in a row ended at 1e-12.
 constexpr double kRounding = 1e-11;
 
 /// The axis of a rotation times its angle in rad. NaN above a third of a turn, where rounding would matter.

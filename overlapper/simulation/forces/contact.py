@@ -64,8 +64,9 @@ class VolumetricContact:
         spread over the patch, with the simulator's coefficients. This is more exact where bodies slip and spin at once.
     substeps : int or 'auto', default 'auto'
         Number of parts of a step of the simulator. 'auto': with a `dissipation`, it follows from the stiffness and the
-        masses, anew in every step. Without one, it follows from the motion. It is 1 for bodies that move little, 2
-        for others, and more for small bodies that would pass through others.
+        masses, anew in every step. Without one, it follows from the motion. It is 1 for bodies that move little, 2 for
+        others, and more for small bodies that would be within others at the end of the step. A body that passes through
+        another one within a substep is not noticed. `Bodies.first_overlaps` finds it.
     restitution : float or callable, optional
         The speed after an impact over the speed before it. Slower impacts than 0.2 m/s have none. Default: that of the
         simulator. In pybullet it is the product of the two links' restitution, which is 0 unless it is set. In MuJoCo
@@ -77,6 +78,7 @@ class VolumetricContact:
     hardening : float or callable, optional
         Growth of the stiffness with the depth, 1/m: the pressure at the depth d is stiffness * d * (1 + hardening * d).
         Default: 0, which is the linear law. It is for contacts with half-spaces alone, such as planes and the ground.
+        In pybullet, GEOM_PLANE and plane_implicit.urdf are half-spaces. The ground of plane.urdf is a box.
         It must be 0 for other pairs, whose patches are not flat, and must not be given with "distributed" friction.
 
     Raises
