@@ -61,7 +61,7 @@ def test_a_run_overrides_the_contact_model_of_a_scene(scene):
 
 def test_an_unknown_contact_model_is_refused(scene):
     either = "which must be 'bullet', 'volumetric' or a dictionary of "
-    either += "dissipation, friction, restitution, rolling, stiffness, substeps"
+    either += "dissipation, friction, hardening, restitution, rolling, stiffness, substeps"
     for each in ("'soft'", "{'mass': 1}"):
         with pytest.raises(SceneError, match=rf"cube\.py has CONTACT = {each}, {either}"):
             scene(f"CONTACT = {each}")
