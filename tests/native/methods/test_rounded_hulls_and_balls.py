@@ -252,8 +252,8 @@ def rotated(turn, point):
     return point + (w * twice + np.cross(axis, twice)) / (axis @ axis + w * w)
 
 
-def agrees_with_slices(body, ball):
-    found, sliced = overlap(body, ball), overlap(body, ball, AROUND)
+def agrees_with_slices(body, ball, around=AROUND):
+    found, sliced = overlap(body, ball), overlap(body, ball, around)
     assert abs(found.volume - sliced.volume) <= found.volume_error + sliced.volume_error
 
 
@@ -289,3 +289,14 @@ def test_facets_that_are_nearly_one_plane(radius, above):
     corners = np.vstack([CUBE_CORNERS, CUBE_CORNERS * [0.5, 0.5, 1 + above]])
     for centre in [(0, 0, 1.0), (0.5, 0.5, 1.25), (0.25, 1, 1), (1, 1, 1), (0.1, 0.2, 1 + radius)]:
         agrees_with_slices(Placed(RoundedHull(corners, 0.25)), Placed(Sphere(radius), centre))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_centres_far_along_a_normal_of_a_small_core(seed):
+    """The directions from its corners to the centre are nearly the normal of a facet."""
+    rng = np.random.default_rng(seed)
+    body = RoundedHull(points(rng, 30), 1e7)
+    ring = np.array(body.core.vertices)[list(body.core.facets[seed])]
+    normal = np.cross(ring[1] - ring[0], ring[2] - ring[0])
+    centre = ring.mean(0) + 0.1 * rng.normal(size=3) + 6e7 * normal / np.linalg.norm(normal)
+    agrees_with_slices(body, Placed(Sphere(6e7), centre), HalfSpace([0, 0, 1], 1e9))

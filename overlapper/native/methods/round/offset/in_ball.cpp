@@ -454,7 +454,7 @@ class InBall {
     tilted_ += off * r_ * r_ * (stop - begin) * most_at(std::sqrt(nearest2));
     BallCorner& corner = end.corner;
     corner.turns.most = std::max(corner.turns.most, ball_ * ball_ - nearest2);
-    if (!end.with_arc || end.anchored) return;
+    if (!end.with_arc) return;
     // The angle of an arc loses more, the nearer it passes to the direction to the centre.
     const double across = begin < 0 && stop > 0 ? 0 : std::min(std::abs(std::sin(begin)), std::abs(std::sin(stop)));
     const double passed = std::sqrt(end.z * end.z + d * d * across * across);
