@@ -51,7 +51,9 @@ OffsetSurface measured(const HullData& hull) {
     const double sine = dot(cross(left, right), edge.along);
     if (!(sine > 0)) surface.exact = false;
     edge.angle = std::atan2(sine, dot(left, right));
-    edge.middle = unit(left + right), edge.across = cross(edge.along, edge.middle);
+    // Normals may be nearly opposite, as those of a thin plate. Their difference then has all digits.
+    if (dot(left, right) < 0) edge.across = unit(right - left), edge.middle = cross(edge.across, edge.along);
+    else edge.middle = unit(left + right), edge.across = cross(edge.along, edge.middle);
     edge.chord = 2 * std::sin(edge.angle / 2);
     edge.of_middle = (edge.angle + std::sin(edge.angle)) / 2, edge.of_across = (edge.angle - std::sin(edge.angle)) / 2;
     surface.mean_width += edge.length * edge.angle / 2;

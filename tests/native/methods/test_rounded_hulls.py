@@ -211,3 +211,22 @@ def test_points_far_from_the_origin_of_their_body_keep_their_digits():
         # Neither sum nor difference rounds. The origin of the hull's data plus the position does.
         found = overlap(Placed(RoundedHull(near + far, 0.125), -far), plane)
         assert abs(found.volume - expected.volume) <= found.volume_error + expected.volume_error
+
+
+@pytest.mark.parametrize("thin", [1e-9, 1e-6, 1e-3])
+@pytest.mark.parametrize("radius", [0.1, 0.5, 1.2])
+@pytest.mark.parametrize(
+    "other",
+    [
+        Placed(HalfSpace((0.98, 0.076, -0.18), 0.04)),
+        Placed(Box((0.5, 0.6, 0.7)), (0.3, 0.4, 0.5), (0.1, 0.2, 0.3, 0.9)),
+        Placed(Hull(points(np.random.default_rng(1), 12) * 3)),
+    ],
+    ids=["half-space", "box", "hull"],
+)
+def test_thin_cores_whose_normals_are_nearly_opposite(thin, radius, other):
+    core = [[0, 1, 0], [0, 0, 1], [thin, 0, 0], [0, 0, 0]]
+    found = overlap(RoundedHull(core, radius), other)
+    lower, upper = found.certificate().verify()
+    assert lower - found.volume_error <= found.volume <= upper + found.volume_error
+    assert found.volume_error <= 1e-12 * found.volume

@@ -442,7 +442,15 @@ class InPolytope {
         // Counter-clockwise around the normals is clockwise about the direction out of the vertex.
         normals -= (end - begin) / 2 * circle.axis;
         const double turn = edge.from == v ? -1 : 1;
-        angle += turn * solid_angle(pole, circle.at(begin), circle.at(end));
+        // Between nearly opposite normals, the triangle loses digits. Its halves do not.
+        constexpr double kLong = 2;
+        const Vec3 first = circle.at(begin), last = circle.at(end);
+        if (end - begin > kLong) {
+          const Vec3 middle = circle.at((begin + end) / 2);
+          angle += turn * (solid_angle(pole, first, middle) + solid_angle(pole, middle, last));
+        } else {
+          angle += turn * solid_angle(pole, first, last);
+        }
       }
     }
     // Circles in the planes of the polytope.
