@@ -300,3 +300,17 @@ def test_centres_far_along_a_normal_of_a_small_core(seed):
     normal = np.cross(ring[1] - ring[0], ring[2] - ring[0])
     centre = ring.mean(0) + 0.1 * rng.normal(size=3) + 6e7 * normal / np.linalg.norm(normal)
     agrees_with_slices(body, Placed(Sphere(6e7), centre), HalfSpace([0, 0, 1], 1e9))
+
+
+@pytest.mark.parametrize("far", [0.0, 1e6, 1e9])
+@pytest.mark.parametrize("origin", [0.0, 1e6])
+@pytest.mark.parametrize("seed", range(4))
+def test_slices_of_a_ball_on_a_core_that_is_far_from_its_origin(far, origin, seed):
+    """The ball touches the core, so that the surface is nearer to the ball's far side than its place is known."""
+    rng = np.random.default_rng(seed)
+    turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    away, foot = np.round(origin * rng.normal(size=3), 3), np.array([0.3, -0.2, 1.0])
+    body = Placed(RoundedHull(CUBE_CORNERS @ turned + away, 0.43), np.round(far * rng.normal(size=3)))
+    ball = Placed(Sphere(0.223), np.array(body.position) + away + (foot + [0, 0, 0.223]) @ turned)
+    agrees_with_slices(body, ball, HalfSpace([0, 0, 1], 1e11))
+    assert np.linalg.norm(overlap(body, ball).gradient[0]) > 0

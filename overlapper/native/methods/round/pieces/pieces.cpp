@@ -18,6 +18,12 @@ constexpr size_t kMostRegionFaces = 64;
 
 Mat3 rounded(const WideMatrix& m) { return {rounded(m.row0), rounded(m.row1), rounded(m.row2)}; }
 
+/// A margin of 1e-12 times this covers the rounding of a place in the world, too. Pieces are placed exactly, and must
+/// not be beyond planes that are.
+double size_of_place(const Placed& body) {
+  return norm(body.pose.translation) + 1e-3 * (norm(body.position) + reach(body.shape));
+}
+
 /// Places the pieces of a body in the world, in double-double. Leaves out parts far from the polytope around the common
 /// set. If that polytope is not known, leaves out parts far from the other body.
 class PlacingCutter final : public Cutter {
@@ -37,7 +43,7 @@ class PlacingCutter final : public Cutter {
     result_.rounding = std::max(result_.rounding, wide_placing(size, !unturned(body.orientation)));
     planes_->clear();
     extent_ = common_ ? common_->extent() : kInfinity;
-    margin_ = 1e-12 * (norm(body.pose.translation) + norm(other.pose.translation) + reach(body.shape));
+    margin_ = 1e-12 * (size_of_place(body) + size_of_place(other) + reach(body.shape));
   }
 
   void begin() override {
@@ -168,7 +174,7 @@ double extent(const Placed& body, Vec3 point) {
 namespace {
 
 double with_places(double size, std::span<const Placed* const> bodies) {
-  for (const Placed* body : bodies) size += norm(body->pose.translation);
+  for (const Placed* body : bodies) size += size_of_place(*body);
   return size;
 }
 
