@@ -244,14 +244,17 @@ class InBall {
     return std::abs(ball_ * ball_ * ball_ / (distance * distance) - distance) / 3;
   }
 
+  /// The distance of the edge's line from the centre, less the radius of its cylinder: from the smaller radius.
+  double gap_of(const BallEdge& edge) const { return r_ < ball_ ? edge.distance - r_ : ball_ - edge.depth; }
+
   bool add_edge(const BallEdge& edge) {
     const OffsetSurface::Edge& own = surface_.edges[edge.number];
     const Vec3 e = own.along, g = edge.to_centre, k = cross(e, g);
     const Vec3 left = surface_.facets[own.left].normal, right = surface_.facets[own.right].normal;
-    const double d = edge.distance, r = r_, ball = ball_, gap = d - r, fourfold = 4 * d * r;
+    const double d = edge.distance, r = r_, ball = ball_, gap = gap_of(edge), fourfold = 4 * d * r;
     // Seen along the edge, the direction from its line to the centre is ψ = 0. The nearest line of the whole cylinder
     // has a chord of 2 √`chord2`.
-    const double chord2 = edge.depth * (ball - r + d);
+    const double chord2 = edge.depth * (ball + gap);
     if (!(chord2 > 0)) return true;
     const double start = edge.exact ? edge.left : std::atan2(dot(left, k), dot(left, g));
     const double end = edge.exact ? edge.right : start + own.angle;
@@ -463,9 +466,9 @@ class InBall {
 
   /// Adds a side of a moved facet, where it is a band's border at ψ. From first to last, the facet is on the left.
   bool add_line(const BallEdge& edge, BallFacet& facet, double psi, double side, int first, int last) {
-    const double half_sine = std::sin(psi / 2), d = edge.distance, gap = d - r_;
+    const double half_sine = std::sin(psi / 2), d = edge.distance, gap = gap_of(edge);
     const double moved = 4 * d * r_ * half_sine * half_sine, ball = ball_;
-    const double chord2 = edge.depth * (ball - r_ + d) - moved;
+    const double chord2 = edge.depth * (ball + gap) - moved;
     if (!(chord2 > 0)) return true;
     const double chord = std::sqrt(chord2);
     const double low = std::max(edge.from, -chord), high = std::min(edge.to, chord);
