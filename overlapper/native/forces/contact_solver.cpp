@@ -47,7 +47,7 @@ constexpr double kSearched = 0.1;
 
 /// Slips are sums of what wrenches do alone. Changes below this share of the largest term count as rounding. Six stiff
 /// contacts in a row ended at 1e-12.
-constexpr double kRounding = 1e-11;
+constexpr double kLeastChange = 1e-11;
 
 /// The axis of a rotation times its angle in rad. NaN above a third of a turn, where rounding would matter.
 Vec3 rotation_vector(const Mat3& turn) {
@@ -871,7 +871,7 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
     double found = free;
     for (int i : island.rows) {
       const double pushed = largest_change(rows_[i], laws[i], laws[i].wrench, duration);
-      found = std::max({found, speed(rows_[i], laws[i], velocity), kRounding / kSettled * pushed});
+      found = std::max({found, speed(rows_[i], laws[i], velocity), kLeastChange / kSettled * pushed});
     }
     return found;
   };

@@ -591,17 +591,23 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
   const Scratch<BallWork> work;
   work->corners.assign(hull.vertices.size(), {}), work->facets.assign(hull.planes.size(), {}), work->edges.clear(),
       work->planes.clear();
-  double nearest = kInfinity, farthest = 0;  // distances of the core
+  double nearest = kInfinity, farthest = 0, size2 = 0;  // distances of the core, and its size, squared
   for (size_t v = 0; v < hull.vertices.size(); ++v) {
     BallCorner& corner = work->corners[v];
     corner.apart = hull.vertices[v] - centre, corner.distance = std::sqrt(norm2(corner.apart));
     nearest = std::min(nearest, corner.distance), farthest = std::max(farthest, corner.distance);
+    size2 = std::max(size2, norm2(hull.vertices[v]));
   }
   const double whole_ball = 4.0 / 3.0 * kPi * radius * radius * radius;
   if (farthest + r <= radius) {
     const double whole = surface.volume(r);
     return VolumeAlone{whole, kOfTermsInBall * whole};
   }
+  // Integrals lose more digits than their error tells where a ball is tiny or huge beside the core, where its centre is
+  // beside a vertex, and where the contact is shallow relative to a radius. There slices answer.
+  constexpr double kTiny = 1e-3, kHuge = 1e3, kBeside = 1e-4, kShallow = 1e-2;
+  const double smaller = std::min(r, radius), size = std::sqrt(size2);
+  if (smaller < kTiny * size || std::max(r, radius) > kHuge * size || nearest < kBeside * smaller) return std::nullopt;
   double off = wide_placing(apart + norm(hull.origin) + reach(rounded_hull.shape), turned);
   double highest = -kInfinity;
   int highest_facet = 0;
@@ -639,6 +645,7 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
   if (highest > 0 && std::abs(nearest - r) <= doubtful) return std::nullopt;
   const bool inside = highest <= 0 || nearest < r;
   const double depth = inside ? radius : sum - nearest;
+  if (depth < kShallow * smaller) return std::nullopt;
 
   // In a shallow contact, depths are taken in double-doubles.
   constexpr double kSure = 0x1p-45;
