@@ -323,12 +323,6 @@ def test_a_stack_settles_from_rest(count):
     assert found.sweeps < 300 and 0 < found.residual <= 1e-8
 
 
-@pytest.mark.parametrize(("count", "sweeps"), [(300, 33), (1200, 10)])
-def test_sweeps_end_after_ten_thousand_visits_but_not_before_ten_sweeps(count, sweeps):
-    found = stack(count).solve()
-    assert found.sweeps == sweeps and found.residual > 1e-8
-
-
 def foot(seed):
     """A foot of two capsules turns slowly on a floor. The capsules cannot both stick."""
     rng = np.random.default_rng(seed)
@@ -384,13 +378,19 @@ def test_a_wall_of_bricks_is_solved_as_a_whole(seed):
     assert broken_laws(solution, 1e-4) == []
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_wall_of_many_bricks_ends_after_ten_thousand_visits(seed):
-    """Without extrapolation, the residuals are 0.007 to 0.009."""
+@pytest.mark.parametrize(("seed", "most"), enumerate([0.01, 0.02, 0.02, 0.01]))
+def test_a_wall_of_many_bricks_ends_after_ten_thousand_visits(seed, most):
+    """Without extrapolation, the residuals are 0.016, 0.038, 0.030 and 0.012."""
     large = wall(seed, 8, 8)
     solution = large.solve()
     assert solution.sweeps == 10000 // len(large.pairs)
-    assert 1e-8 < solution.residual < 5e-3
+    assert 1e-8 < solution.residual < most
+
+
+def test_sweeps_of_a_large_wall_do_not_end_before_ten():
+    large = wall(0, 24, 24)
+    found = large.solve()
+    assert 10000 // len(large.pairs) < 10 == found.sweeps and found.residual > 1e-8
 
 
 def test_each_group_of_bodies_is_solved_by_itself():
