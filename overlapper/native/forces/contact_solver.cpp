@@ -151,8 +151,8 @@ void ContactSolver::make_rows(const Step* step) {
 /// have the same normal: a body that consists of parts moves like a whole body. The damping follows the mean of their
 /// slips, weighted by their forces. This is the slip at the centroid of the whole volume.
 void ContactSolver::share_damping() {
-  // A body leaves the other one with the size of the overlap over the time of recovery at most, also where the patch is
-  // small: a body that is about to be swallowed has a deep overlap with a small patch.
+  // A body that is about to be swallowed has a deep overlap with a small patch. The size of the overlap, over the time
+  // of recovery, limits the speed with which it leaves.
   const auto leaving = [&](int i) {
     const double size = std::cbrt(patches_[i].volume);
     return std::max(rows_[i].area.area, size * size);
@@ -886,7 +886,7 @@ ContactSolver::Ended ContactSolver::settle(const Island& island, std::span<Laws>
       changed = std::max(changed, visit(i, laws[i], duration, velocity));
     }
     if (++ended.sweeps == 1) largest = fastest();
-    // What the first sweep left may be much more than any slip of the solution.
+    // The first sweep may leave slips much larger than those of the solution.
     if (changed <= step.settled * largest && changed <= step.settled * (largest = fastest())) break;
     if (!small && ended.sweeps >= kAlone && ended.sweeps % 2 == 0 && ended.sweeps + 2 <= most &&
         step.friction == Friction::kEllipsoid)

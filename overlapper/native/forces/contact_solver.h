@@ -76,7 +76,7 @@ class ContactSolver {
   /// Solves a step with the patches as they were placed.
   Solution solve(const Step& step);
 
-  /// What the last solution took from the one before. A patch that was not known then has a duration of 0.
+  /// The values that the last solution took from the one before. A patch that was not known then has a duration of 0.
   struct Before {
     Vec3 centroid;    ///< m
     double duration;  ///< s, of that step

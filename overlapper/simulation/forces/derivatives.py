@@ -56,7 +56,7 @@ class StepDerivatives:
     angular velocity, both in the world. The joints of its links follow. Poses have the same n coordinates, as small
     motions from the pose: a translation in m and a rotation vector in rad about the centre of mass for a base, both in
     the world, and the position of each joint. There are p contacts, the rows of `forces`. A matrix has a row for each
-    result and a column for each cause. What is about a contact is the force on the first of the pair in N, then the
+    result and a column for each cause. A contact has the force on the first of the pair in N, then the
     torque on it in N m about `Forces.centre`, in the world. The centre moves with the poses.
 
     These are held: the acceleration by all other forces such as gravity, the length of the substep, whether a contact

@@ -35,8 +35,8 @@ STILL = 1e-8
 class Inputs(NamedTuple):
     """What the laws of the patches between two links depend on. The leading axis is of directions.
 
-    Motions of links are linear at the centre of mass, then angular, in the world: those of a, then those of b. Of the
-    patches there are g.
+    Motions of links are linear at the centre of mass, then angular, in the world: those of a, then those of b. There
+    are g patches.
     """
 
     centres: Any  # (d, 2, 3) m, the centres of mass

@@ -47,7 +47,7 @@ class ExactPlane {
   DoubleDouble offset_;
 };
 
-/// What a vertex has of the sums over its edges.
+/// The part of a vertex in the sums over its edges.
 struct Corner {
   double height = 0;   ///< m, above the plane
   double depth = 0;    ///< m, of the ball around the vertex
