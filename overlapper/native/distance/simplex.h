@@ -110,9 +110,16 @@ inline bool weigh(const WideVector& a, const WideVector& b, const WideVector& c,
 template <class Vector>
 inline constexpr bool kInsideIsExact = std::is_same_v<Vector, Vec3>;
 
+/// A nearest point without its corners.
+template <class Vector>
+struct NearestOf {
+  std::array<decltype(Vector::x), 4> weight{};
+  Vector nearest;
+};
+
 /// Weights of the point of a segment's line nearest to the origin, and that point; false unless both are positive.
 template <class Vector>
-bool weigh(const Vector& a, const Vector& b, SimplexOf<Vector>& s) {
+bool weigh(const Vector& a, const Vector& b, NearestOf<Vector>& s) {
   const Vector ab = b - a;
   const auto wb = -dot(a, ab), wa = dot(b, ab);
   if (!(rounded(wa) > 0 && rounded(wb) > 0)) return false;
@@ -125,7 +132,7 @@ bool weigh(const Vector& a, const Vector& b, SimplexOf<Vector>& s) {
 
 /// The same for a triangle's plane: areas seen along its normal.
 template <class Vector>
-bool weigh(const Vector& a, const Vector& b, const Vector& c, SimplexOf<Vector>& s) {
+bool weigh(const Vector& a, const Vector& b, const Vector& c, NearestOf<Vector>& s) {
   const Vector n = plane_normal(a, b, c);
   const auto wa = dot(n, cross(b, c)), wb = dot(n, cross(c, a)), wc = dot(n, cross(a, b));
   if (!(rounded(wa) > 0 && rounded(wb) > 0 && rounded(wc) > 0 && rounded(dot(n, n)) > 0)) return false;
@@ -137,36 +144,41 @@ bool weigh(const Vector& a, const Vector& b, const Vector& c, SimplexOf<Vector>&
   return true;
 }
 
-/// Keeps the corners that support the point nearest to the origin. Tries all sub-simplices and takes the nearest valid
-/// one. This needs no case analysis of Voronoi regions, which rounding could contradict. Returns the rank() of the
-/// nearest point: 0 if the origin is inside.
+/// Keeps the corners that support the point nearest to the origin. Tries all sub-simplices, or all with the last corner
+/// if the simplex without it was reduced before, and takes the nearest valid one. This needs no case analysis of
+/// Voronoi regions, which rounding could contradict. Returns the rank() of the nearest point: 0 if the origin is
+/// inside.
 template <class Vector>
-auto reduce(SimplexOf<Vector>& s) {
-  SimplexOf<Vector> best;
+auto reduce(SimplexOf<Vector>& s, bool with_last = false) {
+  std::array<Vector, 4> difference;
+  for (int i = 0; i < s.size; ++i) difference[i] = s.corner[i].difference();
+  NearestOf<Vector> best;
+  int best_subset = 0;
   decltype(rank(s.nearest)) least{std::numeric_limits<double>::infinity()};
-  for (int subset = 1; subset < 1 << s.size; ++subset) {
-    SimplexOf<Vector> part;
+  for (int subset = with_last ? 1 << (s.size - 1) : 1; subset < 1 << s.size; ++subset) {
+    NearestOf<Vector> part;
     std::array<Vector, 4> p;
-    for (int i = 0; i < s.size; ++i) {
-      if (!(subset >> i & 1)) continue;
-      p[part.size] = s.corner[i].difference();
-      part.corner[part.size++] = s.corner[i];
-    }
+    int size = 0;
+    for (int i = 0; i < s.size; ++i)
+      if (subset >> i & 1) p[size++] = difference[i];
     bool valid = false;
-    switch (part.size) {
+    switch (size) {
       case 1: part.weight[0] = {1}, part.nearest = p[0], valid = true; break;
       case 2: valid = weigh(p[0], p[1], part); break;
       case 3: valid = weigh(p[0], p[1], p[2], part); break;
       case 4:
         if ((rounded(least) == 0 && !kInsideIsExact<Vector>) || !weigh(p[0], p[1], p[2], p[3], part.weight)) break;
-        s = part;
+        s.weight = part.weight, s.nearest = {};
         return decltype(least){0};
     }
     if (!valid) continue;
     const auto distance = rank(part.nearest);
-    if (distance < least) least = distance, best = part;
+    if (distance < least) least = distance, best = part, best_subset = subset;
   }
-  s = best;
+  int size = 0;
+  for (int i = 0; i < s.size; ++i)
+    if (best_subset >> i & 1) s.corner[size++] = s.corner[i];
+  s.size = size, s.weight = best.weight, s.nearest = best.nearest;
   return least;
 }
 
@@ -174,8 +186,12 @@ auto reduce(SimplexOf<Vector>& s) {
 template <class Vector>
 bool reaches_with_all(SimplexOf<Vector>& s) {
   const auto corner = [&](int i) { return s.corner[i].difference(); };
-  if (s.size == 2) return weigh(corner(0), corner(1), s);
-  return s.size == 3 && weigh(corner(0), corner(1), corner(2), s);
+  NearestOf<Vector> all;
+  if (!(s.size == 2 && weigh(corner(0), corner(1), all)) &&
+      !(s.size == 3 && weigh(corner(0), corner(1), corner(2), all)))
+    return false;
+  s.weight = all.weight, s.nearest = all.nearest;
+  return true;
 }
 
 template <class Vector>
@@ -213,7 +229,7 @@ SeparationOf<Vector> separate(const SimplexOf<Vector>& start, const Support& sup
     SimplexOf<Vector> grown = simplex;
     grown.corner[grown.size++] = farthest;
     SimplexOf<Vector> reduced = grown;
-    const auto nearer = reduce(reduced);
+    const auto nearer = reduce(reduced, true);
     result.origin_inside = rounded(nearer) == 0;
     if (result.origin_inside) {
       // Where signs are not exact, weights of a flat tetrahedron may miss the origin by more than its nearest face

@@ -228,19 +228,73 @@ bool cores_overlap(const Placed& a, const Placed& b, const Distance& d, double r
   return fits && d.overlap > 0 && d.overlap + radius > doubt(reach);
 }
 
-/// True if the bodies certainly overlap because an ellipsoid holds a point of the flat body, with interior points of
-/// that body nearby. The witness points of bodies without a gap are points of both, but for rounding.
-bool ellipsoid_reaches(const Placed& a, const Placed& b, const Distance& d, double reach) {
-  constexpr double kInside = 1e-9;  // relative to the half axes; shallower contacts have other proofs
-  const bool first = stretched(a.shape) != nullptr;
-  const Placed &ellipsoid = first ? a : b, &flat = first ? b : a;
-  const Ellipsoid* own = stretched(ellipsoid.shape);
-  if (!own || smooth(flat.shape)) return false;
-  const Vec3 h = own->half_axes, point = first ? d.witness_b : d.witness_a;
-  const Vec3 local = apply_transposed(ellipsoid.pose.rotation, point - ellipsoid.pose.translation);
-  const double inside = 1 - norm(Vec3{local.x / h.x, local.y / h.y, local.z / h.z});
-  const double way = bounded(flat.shape) ? inside * std::min({h.x, h.y, h.z}) : -d.distance;
-  return (inside > kInside || !bounded(flat.shape)) && way > doubt(reach) && way > kInside * max_component(h);
+/// m: lower bound of the distance of a point from the surface of a round body or an ellipsoid, negative outside. No
+/// value for other bodies.
+std::optional<double> distance_inside(const Placed& body, Vec3 point) {
+  const Vec3 x = apply_transposed(body.pose.rotation, point - body.pose.translation);
+  if (const Ellipsoid* own = stretched(body.shape)) {
+    const Vec3 h = own->half_axes;
+    return (1 - norm(Vec3{x.x / h.x, x.y / h.y, x.z / h.z})) * std::min({h.x, h.y, h.z});
+  }
+  const std::optional<Revolution> own = revolution(body.shape);
+  if (!own) return std::nullopt;
+  const double across = std::hypot(x.x, x.y), beyond = std::abs(x.z) - own->half_length;
+  if (!own->round_ends) return std::min(own->radius - across, -beyond);
+  return own->radius - std::hypot(across, std::max(beyond, 0.0));
+}
+
+/// m: what is deeper than this is certain, though the rounding of points is not bounded. Other proofs decide shallower
+/// contacts.
+double certain_depth(const Placed& body, double reach) {
+  constexpr double kOfSize = 1e-9;
+  return std::max(doubt(reach), kOfSize * radius(body.shape));
+}
+
+/// True if a round body or an ellipsoid certainly holds a point, and all points near it.
+bool holds(const Placed& body, Vec3 point, double reach) {
+  const std::optional<double> inside = distance_inside(body, point);
+  return inside && *inside > certain_depth(body, reach);
+}
+
+/// True if the bodies certainly overlap because one body holds the nearest point of the other. Interior points of the
+/// other body are near that point.
+bool one_holds_a_point(const Placed& a, const Placed& b, const Distance& d, double reach) {
+  const auto beyond_plane = [&](const Placed& body, const Placed& other) {
+    return !bounded(other.shape) && smooth(body.shape) && -d.distance > certain_depth(body, reach);
+  };
+  return holds(a, d.witness_b, reach) || holds(b, d.witness_a, reach) || beyond_plane(a, b) || beyond_plane(b, a);
+}
+
+/// The middle of what two bodies share of the line between their centres. No value if they share nothing of it.
+std::optional<Vec3> common_point_on_line_of_centres(const Placed& a, const Placed& b) {
+  const auto centre = [](const Placed& body) {
+    const HullData* hull = polytope_of(body.shape);
+    return hull ? body.pose * hull->centroid : body.pose.translation;
+  };
+  const Vec3 from = centre(a), to = centre(b), way = to - from;
+  if (norm2(way) == 0) return from;
+  const auto exit = [](const Placed& body, Vec3 start, Vec3 along) {
+    const Plane plane = body.ray_exit(start, along);
+    return -signed_distance(plane, start) / dot(plane.normal, along);
+  };
+  const double first = std::max(0.0, 1 - exit(b, to, -way)), last = std::min(1.0, exit(a, from, way));
+  if (!(first < last)) return std::nullopt;
+  return from + (first + last) / 2 * way;
+}
+
+/// Proves without a search that deep bodies overlap. One body, ball, capsule, cylinder or ellipsoid, certainly holds a
+/// point of the other body.
+std::optional<Search> found_at_centres(const Arrangement& at, Search search) {
+  const Placed &a = at.relative[0], &b = at.relative[1];
+  const auto known = [](const Shape& shape) { return bounded(shape) && !rounded_hull(shape); };
+  if (!known(a.shape) || !known(b.shape) || !(smooth(a.shape) || smooth(b.shape))) return std::nullopt;
+  const std::optional<Vec3> point = common_point_on_line_of_centres(a, b);
+  if (!point) return std::nullopt;
+  const bool in_a = holds(a, *point, search.reach), in_b = holds(b, *point, search.reach);
+  if (!(smooth(a.shape) ? in_a : in_b) || !(smooth(b.shape) ? in_b : in_a)) return std::nullopt;
+  search.status = Status::kOverlapping, search.way = Way::kDual;
+  if (in_a && in_b) search.between = point;
+  return search;
 }
 
 /// A point inside both bodies, about in the middle of what both radii reach between the nearest points of the cores. No
@@ -287,17 +341,18 @@ Search search(const Arrangement& at) {
   for (const Placed& body : bodies) search.reaches.push_back(magnitude(body));
   search.reach = *std::ranges::max_element(search.reaches);
   if (bodies.size() == 2 && (bounded(bodies[0].shape) || bounded(bodies[1].shape))) {
+    if (auto found = found_at_centres(at, search)) return *found;
     const Distance d = distance(bodies[0], bodies[1]);
     if (d.gap > doubt(search.reach)) return search;
     search.hints = facing_planes(bodies, d);
-    if (cores_reach(bodies[0], bodies[1], d, search.reach)) {
+    const bool by_cores = cores_reach(bodies[0], bodies[1], d, search.reach);
+    if (by_cores || cores_overlap(bodies[0], bodies[1], d, search.reach) ||
+        one_holds_a_point(bodies[0], bodies[1], d, search.reach)) {
       search.status = Status::kOverlapping, search.way = Way::kDual;
-      search.between = point_between(bodies[0], bodies[1], d);
-      return search;
-    }
-    if (cores_overlap(bodies[0], bodies[1], d, search.reach) ||
-        ellipsoid_reaches(bodies[0], bodies[1], d, search.reach)) {
-      search.status = Status::kOverlapping, search.way = Way::kDual;
+      if (by_cores) search.between = point_between(bodies[0], bodies[1], d);
+      if (const Vec3 middle = (d.witness_a + d.witness_b) / 2;
+          !search.between && holds(bodies[0], middle, search.reach) && holds(bodies[1], middle, search.reach))
+        search.between = middle;
       return search;
     }
   }

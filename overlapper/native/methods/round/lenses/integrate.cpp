@@ -75,7 +75,7 @@ class Integrating {
       for (int i = 0; i < 2; ++i) {
         const DoubleDouble t = two_sum(places[i].end, places[i].step);
         at[i] = slice(discs_, t.head, wanted_, t.tail);
-        part.sums.add(places[i].weight, at[i]);
+        part.sums.add(places[i].weight, at[i], wanted_);
       }
       const auto add = [&](Series& series, double low, double high) {
         series.add(node, places[0].rate * low, places[1].rate * high);
@@ -142,7 +142,7 @@ class Integrating {
         return;
       }
     }
-    result_.sums.add(1, part.sums);
+    result_.sums.add(1, part.sums, wanted_);
     result_.error += std::max(error_of_series(part), slow_error(part));
     const double area = part.sums.first_area + part.sums.second_area;
     if (wanted_.first) result_.area_error += part.area.stretched_error(area);

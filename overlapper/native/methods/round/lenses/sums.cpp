@@ -380,17 +380,21 @@ Sums cut_slice(const Place& place, const Wanted& wanted) {
 
 }  // namespace
 
-void Sums::add(double weight, const Sums& other) {
+void Sums::add(double weight, const Sums& other, const Wanted& wanted) {
   const Moments& m = other.moments;
   moments += Moments{weight * m.volume, weight * m.first, weight * m.squares, weight * m.products};
   force += weight * other.force;
   moved.row0 += weight * other.moved.row0, moved.row1 += weight * other.moved.row1,
       moved.row2 += weight * other.moved.row2;
   blur += weight * other.blur, oval += weight * other.oval, terms = std::max(terms, other.terms);
-  first_area += weight * other.first_area, second_area += weight * other.second_area;
-  border += weight * other.border;
-  second_force += weight * other.second_force, cut_force += weight * other.cut_force;
-  for (size_t i = 0; i < patch.size(); ++i) patch[i] += weight * other.patch[i];
+  if (wanted.first) first_area += weight * other.first_area, second_area += weight * other.second_area;
+  if (wanted.closing) {
+    border += weight * other.border;
+    second_force += weight * other.second_force;
+  }
+  cut_force += weight * other.cut_force;
+  if (wanted.view)
+    for (size_t i = 0; i < patch.size(); ++i) patch[i] += weight * other.patch[i];
 }
 
 Sums slice(const Discs& discs, double t, const Wanted& wanted, double tail) {

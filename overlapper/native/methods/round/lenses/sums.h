@@ -36,7 +36,8 @@ struct Sums {
   Vec3 second_force;                       ///< ∫ N dA over the second surface and its faces, with `closing`
   Vec3 cut_force;                          ///< the same over walls that are no faces; with all other surface it closes
 
-  void add(double weight, const Sums& other);
+  /// Only what is wanted counts.
+  void add(double weight, const Sums& other, const Wanted& wanted);
 };
 
 /// The integrals of the slice at t + tail per unit of t. The volume is `moments.volume`.
