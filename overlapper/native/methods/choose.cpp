@@ -265,6 +265,20 @@ bool one_holds_a_point(const Placed& a, const Placed& b, const Distance& d, doub
   return holds(a, d.witness_b, reach) || holds(b, d.witness_a, reach) || beyond_plane(a, b) || beyond_plane(b, a);
 }
 
+/// A point that both bodies certainly hold, at or near a point that one of them holds. Distances inside are concave. So
+/// towards the centre of a body, the distance inside that body grows.
+std::optional<Vec3> point_both_hold(const Placed& a, const Placed& b, Vec3 point, double reach) {
+  const auto both_hold = [&](Vec3 p) { return holds(a, p, reach) && holds(b, p, reach); };
+  if (both_hold(point)) return point;
+  for (const auto& [inner, outer] : {std::pair(&a, &b), std::pair(&b, &a)}) {
+    if (!holds(*inner, point, reach)) continue;
+    const Vec3 way = outer->pose.translation - point;
+    const Vec3 moved = point + std::min(1.0, *distance_inside(*inner, point) / 2 / norm(way)) * way;
+    if (both_hold(moved)) return moved;
+  }
+  return std::nullopt;
+}
+
 /// The middle of what two bodies share of the line between their centres. No value if they share nothing of it.
 std::optional<Vec3> common_point_on_line_of_centres(const Placed& a, const Placed& b) {
   const auto centre = [](const Placed& body) {
@@ -290,10 +304,9 @@ std::optional<Search> found_at_centres(const Arrangement& at, Search search) {
   if (!known(a.shape) || !known(b.shape) || !(smooth(a.shape) || smooth(b.shape))) return std::nullopt;
   const std::optional<Vec3> point = common_point_on_line_of_centres(a, b);
   if (!point) return std::nullopt;
-  const bool in_a = holds(a, *point, search.reach), in_b = holds(b, *point, search.reach);
-  if (!(smooth(a.shape) ? in_a : in_b) || !(smooth(b.shape) ? in_b : in_a)) return std::nullopt;
+  if (!holds(a, *point, search.reach) && !holds(b, *point, search.reach)) return std::nullopt;
   search.status = Status::kOverlapping, search.way = Way::kDual;
-  if (in_a && in_b) search.between = point;
+  search.between = point_both_hold(a, b, *point, search.reach);
   return search;
 }
 
@@ -350,9 +363,8 @@ Search search(const Arrangement& at) {
         one_holds_a_point(bodies[0], bodies[1], d, search.reach)) {
       search.status = Status::kOverlapping, search.way = Way::kDual;
       if (by_cores) search.between = point_between(bodies[0], bodies[1], d);
-      if (const Vec3 middle = (d.witness_a + d.witness_b) / 2;
-          !search.between && holds(bodies[0], middle, search.reach) && holds(bodies[1], middle, search.reach))
-        search.between = middle;
+      if (!search.between)
+        search.between = point_both_hold(bodies[0], bodies[1], (d.witness_a + d.witness_b) / 2, search.reach);
       return search;
     }
   }
