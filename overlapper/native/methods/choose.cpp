@@ -228,9 +228,9 @@ bool cores_overlap(const Placed& a, const Placed& b, const Distance& d, double r
   return fits && d.overlap > 0 && d.overlap + radius > doubt(reach);
 }
 
-/// m: lower bound of the distance of a point from the surface of a round body or an ellipsoid, negative outside. No
-/// value for other bodies.
+/// m: lower bound of the distance of a point from the surface of a body, negative outside. No value for a rounded hull.
 std::optional<double> distance_inside(const Placed& body, Vec3 point) {
+  if (!smooth(body.shape)) return -signed_distance(body.tightest(point), point);
   const Vec3 x = apply_transposed(body.pose.rotation, point - body.pose.translation);
   if (const Ellipsoid* own = stretched(body.shape)) {
     const Vec3 h = own->half_axes;
@@ -250,7 +250,7 @@ double certain_depth(const Placed& body, double reach) {
   return std::max(doubt(reach), kOfSize * radius(body.shape));
 }
 
-/// True if a round body or an ellipsoid certainly holds a point, and all points near it.
+/// True if a body certainly holds a point, and all points near it.
 bool holds(const Placed& body, Vec3 point, double reach) {
   const std::optional<double> inside = distance_inside(body, point);
   return inside && *inside > certain_depth(body, reach);
@@ -265,14 +265,19 @@ bool one_holds_a_point(const Placed& a, const Placed& b, const Distance& d, doub
   return holds(a, d.witness_b, reach) || holds(b, d.witness_a, reach) || beyond_plane(a, b) || beyond_plane(b, a);
 }
 
+Vec3 centre(const Placed& body) {
+  const HullData* hull = polytope_of(body.shape);
+  return hull ? body.pose * hull->centroid : body.pose.translation;
+}
+
 /// A point that both bodies certainly hold, at or near a point that one of them holds. Distances inside are concave. So
 /// towards the centre of a body, the distance inside that body grows.
 std::optional<Vec3> point_both_hold(const Placed& a, const Placed& b, Vec3 point, double reach) {
   const auto both_hold = [&](Vec3 p) { return holds(a, p, reach) && holds(b, p, reach); };
   if (both_hold(point)) return point;
   for (const auto& [inner, outer] : {std::pair(&a, &b), std::pair(&b, &a)}) {
-    if (!holds(*inner, point, reach)) continue;
-    const Vec3 way = outer->pose.translation - point;
+    if (!bounded(outer->shape) || !holds(*inner, point, reach)) continue;
+    const Vec3 way = centre(*outer) - point;
     const Vec3 moved = point + std::min(1.0, *distance_inside(*inner, point) / 2 / norm(way)) * way;
     if (both_hold(moved)) return moved;
   }
@@ -281,10 +286,6 @@ std::optional<Vec3> point_both_hold(const Placed& a, const Placed& b, Vec3 point
 
 /// The middle of what two bodies share of the line between their centres. No value if they share nothing of it.
 std::optional<Vec3> common_point_on_line_of_centres(const Placed& a, const Placed& b) {
-  const auto centre = [](const Placed& body) {
-    const HullData* hull = polytope_of(body.shape);
-    return hull ? body.pose * hull->centroid : body.pose.translation;
-  };
   const Vec3 from = centre(a), to = centre(b), way = to - from;
   if (norm2(way) == 0) return from;
   const auto exit = [](const Placed& body, Vec3 start, Vec3 along) {
@@ -360,7 +361,7 @@ Search search(const Arrangement& at) {
     search.hints = facing_planes(bodies, d);
     const bool by_cores = cores_reach(bodies[0], bodies[1], d, search.reach);
     if (by_cores || cores_overlap(bodies[0], bodies[1], d, search.reach) ||
-        one_holds_a_point(bodies[0], bodies[1], d, search.reach)) {
+        (!polyhedral(bodies) && one_holds_a_point(bodies[0], bodies[1], d, search.reach))) {
       search.status = Status::kOverlapping, search.way = Way::kDual;
       if (by_cores) search.between = point_between(bodies[0], bodies[1], d);
       if (!search.between)
