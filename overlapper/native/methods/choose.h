@@ -107,7 +107,7 @@ struct Search {
   std::vector<double> reaches;    ///< size of the numbers that describe each body
   double reach = 0;               ///< the largest of `reaches`
   std::vector<OwnedPlane> hints;  ///< planes for a search for a ball to start with
-  std::optional<Vec3> between;    ///< a point certainly inside both, if the rounded cores of a pair are separated
+  std::optional<Vec3> between;    ///< a point certainly inside both bodies of a pair, if one was found
   std::optional<Inside> inside;   ///< no value if the status was known without it
 };
 /// Throws std::invalid_argument if the common set is unbounded.

@@ -9,7 +9,7 @@ import pytest
 from families import make
 from rules import UNPROVED, answer, complaints, figures_are_finite
 
-from overlapper import Placed, Sphere, overlap
+from overlapper import Cylinder, Ellipsoid, Hull, Placed, Sphere, overlap, overlaps
 
 
 def slender_and_apart():
@@ -131,3 +131,26 @@ def test_a_ball_of_a_nanometre_on_one_of_a_thousand_kilometres_overlaps_it():
 def test_hulls_of_hundreds_of_facets_have_all_their_figures():
     case = make("pole_slivers", 70000)
     assert not figures_are_finite(case, answer(case.placed))
+
+
+@pytest.mark.parametrize("depth", [1e-6, 1e-7, 1e-8])
+def test_a_cylinder_overlaps_the_tip_of_a_needle_that_it_holds(depth):
+    """The largest ball in the tip is smaller than rounding. The vertex is in the cylinder beyond all rounding."""
+    width = 1e-7
+    needle = Hull([[1 - depth, 0, 0.1], [2, width, 0.1], [2, -width, 0.1], [2, 0, 0.1 + width]])
+    found = overlap(Cylinder(1, 2), needle)
+    assert found.status == "overlapping"
+    lower, upper = found.certificate().verify()
+    assert lower <= Fraction(found.volume) <= upper
+    assert found.volume == pytest.approx(depth**3 * width**2 / 3, rel=1e-5)
+
+
+@pytest.mark.parametrize("second", [Cylinder(0.3, 0.8), Ellipsoid([0.3, 0.4, 0.5])], ids=str)
+@pytest.mark.parametrize("first", [Cylinder(0.4, 1), Ellipsoid([0.5, 0.3, 0.4])], ids=str)
+def test_no_search_for_a_ball_precedes_slices_of_deep_bodies(first, second):
+    """Such a search looks at many planes of each body."""
+    found = overlaps(
+        [first, second], [(0.1, 0.2, 0.05), (0, 0, 0)], [(0.1, 0.2, 0.3, 0.9), (0, 0, 0, 1)], pairs=[(0, 1)]
+    )
+    assert found.volume[0] > 0
+    assert found.planes_asked <= 2
