@@ -70,6 +70,21 @@ OffsetSurface measured(const HullData& hull) {
   std::vector<int> next(surface.first_edge);
   for (int e = 0; e < static_cast<int>(hull.edges.size()); ++e)
     for (const int v : {hull.edges[e].from, hull.edges[e].to}) surface.edges_by_vertex[next[v]++] = e;
+  surface.sides.assign(hull.ring.size(), -1);
+  for (int e = 0; e < static_cast<int>(surface.edges.size()); ++e) {
+    OffsetSurface::Edge& edge = surface.edges[e];
+    for (const bool right : {false, true}) {
+      const int facet = right ? edge.right : edge.left, begin = right ? edge.to : edge.from;
+      const auto ring = hull.facet(facet);
+      const int n = static_cast<int>(ring.size());
+      const int k = static_cast<int>(std::ranges::find(ring, begin) - ring.begin());
+      if (k == n || ring[(k + 1) % n] != (right ? edge.from : edge.to)) continue;
+      const int here = hull.ring_start[facet] + k, after = hull.ring_start[facet] + (k + 1) % n;
+      surface.sides[here] = 2 * e + right;
+      edge.corners[right ? 3 : 0] = here, edge.corners[right ? 2 : 1] = after;
+    }
+  }
+  if (std::ranges::find(surface.sides, -1) != surface.sides.end()) surface.exact = false;
   return surface;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -28,6 +29,8 @@ struct OffsetSurface {
     double chord = 0;      ///< ∫ n is this times `middle`
     double of_middle = 0;  ///< ∫ n nᵀ is this times middle middleᵀ ...
     double of_across = 0;  ///< ... and this times across acrossᵀ
+    /// Places in `HullData::ring`: of `from` and `to` in the left facet, and of `from` and `to` in the right facet.
+    std::array<int, 4> corners{};
   };
   /// The normals at a vertex.
   struct Vertex {
@@ -41,6 +44,8 @@ struct OffsetSurface {
     return std::span(edges_by_vertex).subspan(first_edge[vertex], first_edge[vertex + 1] - first_edge[vertex]);
   }
   std::vector<int> edges_by_vertex, first_edge;
+  /// For each place in `HullData::ring`, twice the number of the edge that begins there; 1 more on its right side.
+  std::vector<int> sides;
   double core_volume = 0, area = 0, mean_width = 0;  ///< Steiner: the volume is V + area r + mean_width r² + 4/3 π r³
   bool exact = false;  ///< exact numbers give every facet, and no two facets turn inwards at their edge
 

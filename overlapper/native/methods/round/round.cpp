@@ -5,6 +5,7 @@
 #include "geometry/rounding.h"
 #include "methods/round/offset/in_ball.h"
 #include "methods/round/offset/in_polytope.h"
+#include "methods/round/offset/two_rounded.h"
 
 namespace overlapper {
 namespace {
@@ -55,9 +56,11 @@ std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b) {
   const Placed &rounded = first ? a : b, &other = first ? b : a;
   if (!rounded_hull(rounded.shape)) return std::nullopt;
   if (!smooth(other.shape)) return offset::volume_in_polytope(rounded, other);
+  if (rounded_hull(other.shape)) return offset::volume_of_two_rounded(rounded, other);
   const auto revolved = revolution(other.shape);
-  if (revolved && revolved->round_ends && revolved->half_length == 0) return offset::volume_in_ball(rounded, other);
-  return std::nullopt;
+  if (!revolved || !revolved->round_ends) return std::nullopt;
+  return revolved->half_length == 0 ? offset::volume_in_ball(rounded, other)
+                                    : offset::volume_of_two_rounded(rounded, other);
 }
 
 std::optional<pieces::RoundMeasures> measure_by_slices(const pieces::SlicedPair& pair) {

@@ -13,6 +13,7 @@
 #include "geometry/rounding.h"
 #include "geometry/scratch.h"
 #include "methods/round/offset/below_plane.h"
+#include "methods/round/offset/solid_angle.h"
 
 namespace overlapper::offset {
 namespace {
@@ -73,11 +74,6 @@ struct Trigonometric {
     cc = (one + (s1 * c1 - s0 * c0)) / 2, ss = (one - (s1 * c1 - s0 * c0)) / 2, cs = (s1 * s1 - s0 * s0) / 2;
   }
 };
-
-/// The solid angle of a triangle on the unit sphere, with its sign.
-double solid_angle(Vec3 a, Vec3 b, Vec3 c) {
-  return 2 * std::atan2(dot(a, cross(b, c)), 1 + dot(a, b) + dot(b, c) + dot(c, a));
-}
 
 class InPolytope {
  public:
@@ -442,15 +438,8 @@ class InPolytope {
         // Counter-clockwise around the normals is clockwise about the direction out of the vertex.
         normals -= (end - begin) / 2 * circle.axis;
         const double turn = edge.from == v ? -1 : 1;
-        // Between nearly opposite normals, the triangle loses digits. Its halves do not.
-        constexpr double kLong = 2;
-        const Vec3 first = circle.at(begin), last = circle.at(end);
-        if (end - begin > kLong) {
-          const Vec3 middle = circle.at((begin + end) / 2);
-          angle += turn * (solid_angle(pole, first, middle) + solid_angle(pole, middle, last));
-        } else {
-          angle += turn * solid_angle(pole, first, last);
-        }
+        const Vec3 middle = circle.at((begin + end) / 2);
+        angle += turn * solid_angle(pole, circle.at(begin), middle, circle.at(end), end - begin);
       }
     }
     // Circles in the planes of the polytope.

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <optional>
+
+#include "geometry/measures.h"
+#include "shapes/shape.h"
+
+namespace overlapper::offset {
+
+/// The volume of two rounded hulls, or of a rounded hull and a capsule, by both surfaces. The surfaces consist of moved
+/// facets, bands of cylinders and parts of spheres. Every two of these that are near each other cross along parts of a
+/// line, an ellipse, a circle or a quartic. Where a crossing leaves a feature, it goes on in the feature beside it. The
+/// flux of x / 3 through the part of a feature in the other body is an integral along the border of this part (Stokes).
+///
+/// No value if facets are not exact, if features touch up to rounding, or if the error is more than kEnough of the
+/// volume.
+std::optional<VolumeAlone> volume_of_two_rounded(const Placed& a, const Placed& b);
+
+}  // namespace overlapper::offset
