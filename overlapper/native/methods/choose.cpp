@@ -575,7 +575,7 @@ std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, Vec3 cen
 std::optional<VolumeAlone> volume_alone(const OverlappingBodies& overlapping) {
   if (!choose(traits(overlapping.bodies)).tries(Way::kClosedForm) || overlapping.bodies.size() != 2)
     return std::nullopt;
-  return volume_by_surface(overlapping.at.relative[0], overlapping.at.relative[1]);
+  return volume_by_surface(overlapping.at.relative[0], overlapping.at.relative[1], overlapping.search().between);
 }
 
 namespace {

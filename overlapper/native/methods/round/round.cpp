@@ -51,16 +51,16 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
   return best;
 }
 
-std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b) {
+std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b, const std::optional<Vec3>& between) {
   const bool first = rounded_hull(a.shape);
   const Placed &rounded = first ? a : b, &other = first ? b : a;
   if (!rounded_hull(rounded.shape)) return std::nullopt;
   if (!smooth(other.shape)) return offset::volume_in_polytope(rounded, other);
-  if (rounded_hull(other.shape)) return offset::volume_of_two_rounded(rounded, other);
+  if (rounded_hull(other.shape)) return offset::volume_of_two_rounded(rounded, other, between);
   const auto revolved = revolution(other.shape);
   if (!revolved || !revolved->round_ends) return std::nullopt;
   return revolved->half_length == 0 ? offset::volume_in_ball(rounded, other)
-                                    : offset::volume_of_two_rounded(rounded, other);
+                                    : offset::volume_of_two_rounded(rounded, other, between);
 }
 
 std::optional<pieces::RoundMeasures> measure_by_slices(const pieces::SlicedPair& pair) {

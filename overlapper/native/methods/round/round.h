@@ -85,7 +85,7 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
 
 /// The volume of an overlapping pair by the surface of a rounded hull, if one body is a rounded hull and the other one
 /// a half-space, a box, a hull or a ball.
-std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b);
+std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b, const std::optional<Vec3>& between);
 
 /// The measures of an overlapping pair by slices.
 std::optional<pieces::RoundMeasures> measure_by_slices(const pieces::SlicedPair& pair);

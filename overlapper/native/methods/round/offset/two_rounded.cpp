@@ -13,6 +13,7 @@
 #include "geometry/constants.h"
 #include "geometry/rounding.h"
 #include "geometry/scratch.h"
+#include "geometry/wide_pose.h"
 #include "methods/round/offset/solid_angle.h"
 #include "methods/round/slicing/rules.h"
 #include "shapes/hull_data.h"
@@ -34,21 +35,30 @@ struct Border {
 };
 struct MovedFacet {
   Plane plane;
-  Vec3 origin;  ///< nearest to the origin of coordinates
+  Vec3 nearest;  ///< to the origin
   double twice_area = 0;
+  bool kept = false;
 };
-/// Points of the band are from + t along + r (cos φ middle + sin φ across), for |φ| ≤ half.
+/// Points of the band are foot + t along + r u, for u = cos φ middle + sin φ across, |φ| ≤ half and begin ≤ t ≤ end.
+/// With the direction w from the foot to the origin, x · u at the band is rise + lever (1 − w · u).
 struct Band {
-  Vec3 from, along, middle, across;
-  double length = 0, half = 0;
-  double base = 0;                         ///< m: integrals count t from here
-  double plain = 0, cosine = 0, sine = 0;  ///< ∫∫ 1, cos φ, sin φ over φ and t
+  Vec3 foot;  ///< of the origin on the axis
+  Vec3 along, middle, across;
+  double begin = 0, end = 0, half = 0;
+  double base = 0;  ///< m: integrals count t from here
+  Vec3 toward;      ///< w
+  double rise = 0, lever = 0;
+  double plain = 0, cap = 0;  ///< ∫∫ 1, 1 − w · u over φ and t
+  Vec3 vector;                ///< m²: ∫ u over the area
 };
+/// Points of the patch are centre + r u. With a direction w, x · u is rise + lever (1 − w · u) + aside · u.
 struct Patch {
-  Vec3 centre, pole;
-  double least = 1;  ///< cosine of the largest angle between the pole and a normal
-  Vec3 normals;      ///< ∫ u over the solid angle
-  double angle = 0;  ///< the solid angle
+  Vec3 centre;
+  Vec3 toward;  ///< w, not opposite to a normal
+  double rise = 0, lever = 0;
+  Vec3 aside;
+  double angle = 0, cap = 0;  ///< ∫ 1, 1 − w · u over the solid angle
+  Vec3 vector;                ///< m²: ∫ u over the area
 };
 /// A point where an element, a line or an arc between two features, passes through the surface of the other body.
 struct Crossing {
@@ -67,8 +77,12 @@ struct Around {
 struct Side {
   const OffsetSurface* surface = nullptr;  ///< null for a capsule
   const HullData* hull = nullptr;
-  double r = 0;
+  double r = 0, half_length = 0;
+  Mat3 rotation;
+  WideMatrix wide_rotation;
+  WideVector inner;  ///< the origin in the coordinates of the core
   std::vector<Vec3> vertices;
+  std::vector<char> near;  ///< for each vertex: 1 if its sphere may reach the other body
   std::vector<MovedFacet> facets;
   std::vector<Band> bands;
   std::vector<Patch> patches;
@@ -76,11 +90,11 @@ struct Side {
   std::vector<Around> around;
   std::vector<Crossing> crossings;
   std::vector<char> crossed;  ///< for each feature
+  std::vector<int> elements;  ///< that may be in the other body
   std::vector<int> root;      ///< of nodes that elements without a crossing join
   std::vector<char> inside;   ///< for each node: 0, 1 or 2 if not known
   Bounds bounds;
 
-  int count(const std::vector<Band>&) const { return static_cast<int>(bands.size()); }
   int first_band() const { return static_cast<int>(facets.size()); }
   int first_patch() const { return first_band() + static_cast<int>(bands.size()); }
   int features() const { return first_patch() + static_cast<int>(patches.size()); }
@@ -96,6 +110,32 @@ struct Side {
     return element % 2 == 0 ? std::pair{corners[0], corners[2]} : std::pair{corners[1], corners[3]};
   }
 };
+
+Vec3 corner_of(const Side& side, int v) {
+  if (!side.capsule()) return side.hull->vertices[v];
+  return {0, 0, v == 0 ? -side.half_length : side.half_length};
+}
+WideVector wide_corner(const Side& side, int v) { return wide(corner_of(side, v)) - side.inner; }
+std::pair<int, int> ends_of_band(const Side& side, int e) {
+  if (side.capsule()) return {0, 1};
+  return {side.surface->edges[e].from, side.surface->edges[e].to};
+}
+WideVector wide_along(const Side& side, int e) {
+  const auto [from, to] = ends_of_band(side, e);
+  return unit(wide_difference(corner_of(side, to), corner_of(side, from)));
+}
+/// The plane of a moved facet about the origin.
+WidePlane wide_plane(const Side& side, int f) {
+  const auto [a, b, c] = side.hull->facet_corners[f];
+  const auto& corners = side.hull->corners;
+  const WideVector normal = unit(wide_normal(corners[a], corners[b], corners[c]));
+  return {normal, dot(normal, wide(corners[a]) - side.inner) + DoubleDouble{side.r}};
+}
+/// m: how far the surface of a cylinder or a sphere lies beyond the origin.
+double wide_rise_of_band(const Side& side, int e) {
+  return (DoubleDouble{side.r} - norm(cross(wide_corner(side, ends_of_band(side, e).first), wide_along(side, e)))).head;
+}
+double wide_rise_of_patch(const Side& side, int v) { return (DoubleDouble{side.r} - norm(wide_corner(side, v))).head; }
 
 struct Limit {
   Plane plane;
@@ -157,7 +197,9 @@ struct Curve {
 
 class TwoRounded {
  public:
-  TwoRounded(TwoWork& work, double tie, double extent) : work_(work), tie_(tie), extent_(extent) {}
+  /// In `wide` arithmetic, depths come from double-doubles, and signs of depths are certain beyond `off`.
+  TwoRounded(TwoWork& work, bool wide, double tie, double off, double extent)
+      : work_(work), wide_(wide), tie_(tie), off_(off), extent_(extent) {}
 
   bool cross_all() {
     std::array<std::span<const Around>, 2> around{work_.sides[0].around, work_.sides[1].around};
@@ -187,8 +229,10 @@ class TwoRounded {
   }
 
   double volume() const { return thrice_ / 3; }
-  double error(double rounding) const {
-    return (rounding + off_) * area_ + kOfTermsOfTwo * size_ + norm(unbalanced_) * extent_ + open_ * extent_ * extent_;
+  double error() const {
+    const double least = std::min(extent_, reach_);
+    return off_ * area_ + kOfTermsOfTwo * size_ + norm(unbalanced_) * least +
+           (open_ * least + tie_ * border_) * height_;
   }
 
  private:
@@ -198,7 +242,7 @@ class TwoRounded {
     if (feature < side.first_band()) return side.facets[feature].plane.normal;
     if (feature < side.first_patch()) {
       const Band& band = side.bands[feature - side.first_band()];
-      const Vec3 from = point - band.from;
+      const Vec3 from = point - band.foot;
       return (from - dot(from, band.along) * band.along) / side.r;
     }
     return (point - side.patches[feature - side.first_patch()].centre) / side.r;
@@ -290,7 +334,7 @@ class TwoRounded {
       const double slope = dot(plane.normal, band.along);
       if (std::abs(slope) < kAlike) return false;
       const auto along_plane = [&](Vec3 way) { return way - dot(plane.normal, way) / slope * band.along; };
-      conic.start = band.from - signed_distance(plane, band.from) / slope * band.along;
+      conic.start = band.foot - signed_distance(plane, band.foot) / slope * band.along;
       conic.x = side.r * along_plane(band.middle), conic.y = side.r * along_plane(band.across);
       if (!side.capsule()) {
         const int e = feature - side.first_band();
@@ -298,15 +342,44 @@ class TwoRounded {
         first = {{}, side.lines[2 * e].element, 1 - body}, last = {{}, side.lines[2 * e + 1].element, 1 - body};
       }
     } else {
-      const Patch& patch = side.patches[feature - side.first_patch()];
-      const double level = -signed_distance(plane, patch.centre), square = (side.r - level) * (side.r + level);
-      if (std::abs(std::abs(level) - side.r) < tie_) return false;
-      if (!(square > 0)) return true;
-      circle(conic, patch.centre + level * plane.normal, plane.normal, std::sqrt(square));
+      const int v = feature - side.first_patch();
+      const Vec3 centre = side.patches[v].centre;
+      const double depth = wide_ ? wide_depth_below(body, features_[body], v) : side.r - signed_distance(plane, centre);
+      if (std::abs(depth) < sure_ || std::abs(2 * side.r - depth) < sure_) return false;
+      if (depth < 0 || depth > 2 * side.r) return true;
+      circle(conic, plane.offset * plane.normal + (centre - dot(plane.normal, centre) * plane.normal), plane.normal,
+             std::sqrt(depth * (2 * side.r - depth)));
     }
     work_.limits.clear();
     append_limits(body, features_[body], true), append_limits(1 - body, feature, false);
     return divide(conic, low, high, first, last);
+  }
+
+  /// How deep the sphere of a patch reaches below the plane of a facet of another body.
+  double wide_depth_below(int body, int f, int v) const {
+    const Side &side = work_.sides[body], &other = work_.sides[1 - body];
+    const WidePlane plane = wide_plane(side, f);
+    const WideVector centre = apply_transposed(side.wide_rotation, other.wide_rotation * wide_corner(other, v));
+    return (DoubleDouble{other.r} - signed_distance(plane, centre)).head;
+  }
+  double wide_depth_of_patches(int v, int w) const {
+    const Side &a = work_.sides[0], &b = work_.sides[1];
+    const WideVector apart = b.wide_rotation * wide_corner(b, w) - a.wide_rotation * wide_corner(a, v);
+    return (two_sum(a.r, b.r) - norm(apart)).head;
+  }
+  double wide_depth_at_band(int body, int e, int v) const {
+    const Side &side = work_.sides[body], &other = work_.sides[1 - body];
+    const WideVector centre = apply_transposed(side.wide_rotation, other.wide_rotation * wide_corner(other, v));
+    const WideVector apart = centre - wide_corner(side, ends_of_band(side, e).first);
+    return (two_sum(side.r, other.r) - norm(overlapper::cross(apart, wide_along(side, e)))).head;
+  }
+  double wide_depth_of_bands(int e, int g) const {
+    const Side &a = work_.sides[0], &b = work_.sides[1];
+    const WideVector along = a.wide_rotation * wide_along(a, e), far = b.wide_rotation * wide_along(b, g);
+    const WideVector apart = b.wide_rotation * wide_corner(b, ends_of_band(b, g).first) -
+                             a.wide_rotation * wide_corner(a, ends_of_band(a, e).first);
+    const WideVector common = overlapper::cross(along, far);
+    return (two_sum(a.r, b.r) - abs(dot(apart, common)) / norm(common)).head;
   }
 
   static void circle(Curve& conic, Vec3 centre, Vec3 axis, double radius) {
@@ -317,11 +390,11 @@ class TwoRounded {
 
   bool cross_patches() {
     const Side &a = work_.sides[0], &b = work_.sides[1];
-    const Vec3 from = a.patches[features_[0] - a.first_patch()].centre;
-    const Vec3 apart = b.patches[features_[1] - b.first_patch()].centre - from;
-    const double distance = std::sqrt(norm2(apart)), depth = a.r + b.r - distance,
-                 nested = distance - std::abs(a.r - b.r);
-    if (std::abs(depth) < tie_ || std::abs(nested) < tie_) return false;
+    const int v = features_[0] - a.first_patch(), w = features_[1] - b.first_patch();
+    const Vec3 from = a.patches[v].centre, apart = b.patches[w].centre - from;
+    const double distance = std::sqrt(norm2(apart)), nested = distance - std::abs(a.r - b.r);
+    const double depth = wide_ ? wide_depth_of_patches(v, w) : a.r + b.r - distance;
+    if (std::abs(depth) < sure_ || std::abs(nested) < tie_) return false;
     if (depth < 0 || nested < 0) return true;
     // From the centre of a: level, and a.r − level.
     const double below = depth * (b.r + distance - a.r) / (2 * distance), level = a.r - below;
@@ -336,19 +409,21 @@ class TwoRounded {
   bool cross_band_and_patch(int body) {
     const Side &side = work_.sides[body], &other = work_.sides[1 - body];
     const Band& band = side.bands[features_[body] - side.first_band()];
-    const Vec3 apart = other.patches[features_[1 - body] - other.first_patch()].centre - band.from;
+    const int v = features_[1 - body] - other.first_patch();
+    const Vec3 apart = other.patches[v].centre - band.foot;
     const double foot = dot(apart, band.along), r = side.r, ball = other.r;
     const Vec3 across = apart - foot * band.along;
     const double distance = std::sqrt(norm2(across));
     Curve quartic{};
     quartic.kind = Curve::Kind::kQuartic;
-    const double depth = ball + r - distance, deep = ball - r + distance;
-    if (std::abs(depth) < tie_ || std::abs(deep) < tie_) return false;
+    const double depth = wide_ ? wide_depth_at_band(body, features_[body] - side.first_band(), v) : ball + r - distance;
+    const double deep = ball - r + distance;
+    if (std::abs(depth) < sure_ || std::abs(deep) < tie_) return false;
     if (depth < 0 || deep < 0) return true;
     quartic.p = depth * deep;
     const double reach = std::sqrt(quartic.p);
-    if (foot + reach < -tie_ || foot - reach > band.length + tie_) return true;
-    quartic.start = band.from + foot * band.along, quartic.e = band.along, quartic.r = r;
+    if (foot + reach < band.begin - tie_ || foot - reach > band.end + tie_) return true;
+    quartic.start = band.foot + foot * band.along, quartic.e = band.along, quartic.r = r;
     quartic.x = distance > tie_ ? across / distance : any_orthogonal(band.along);
     quartic.y = overlapper::cross(band.along, quartic.x);
     quartic.p1 = 4 * distance * r;
@@ -364,11 +439,12 @@ class TwoRounded {
     const double r = side.r, ball = other.r;
     Vec3 common = overlapper::cross(band.along, far.along);
     const double sine = std::sqrt(norm2(common)), cosine = dot(band.along, far.along);
-    const Vec3 apart = far.from - band.from;
+    const Vec3 apart = far.foot - band.foot;
     if (!(sine > kAlikeAxes)) {
       // The nearest points of the segments of both axes may be anywhere.
       const Vec3 across = apart - dot(apart, band.along) * band.along;
-      return std::sqrt(norm2(across)) - sine * far.length > r + ball + tie_;
+      const double farthest = std::max(std::abs(far.begin), std::abs(far.end));
+      return std::sqrt(norm2(across)) - sine * farthest > r + ball + tie_;
     }
     common = common / sine;
     const double foot = dot(overlapper::cross(apart, far.along), common) / sine;
@@ -376,15 +452,17 @@ class TwoRounded {
     const Vec3 between = apart + far_foot * far.along - foot * band.along;
     double distance = dot(between, common);
     if (distance < 0) common = -common, distance = -distance;
-    const double depth = r + ball - distance;
-    if (std::abs(depth) < tie_) return false;
+    const double depth = wide_ ? wide_depth_of_bands(features_[0] - work_.sides[0].first_band(),
+                                                     features_[1] - work_.sides[1].first_band())
+                               : r + ball - distance;
+    if (std::abs(depth) < sure_) return false;
     if (depth < 0) return true;
     const double reach = (ball + r * std::abs(cosine)) / sine, far_reach = (r + ball * std::abs(cosine)) / sine;
-    if (foot + reach < -tie_ || foot - reach > band.length + tie_) return true;
-    if (far_foot + far_reach < -tie_ || far_foot - far_reach > far.length + tie_) return true;
+    if (foot + reach < band.begin - tie_ || foot - reach > band.end + tie_) return true;
+    if (far_foot + far_reach < far.begin - tie_ || far_foot - far_reach > far.end + tie_) return true;
     Curve quartic{};
     quartic.kind = Curve::Kind::kQuartic;
-    quartic.start = band.from + foot * band.along, quartic.e = band.along, quartic.r = r;
+    quartic.start = band.foot + foot * band.along, quartic.e = band.along, quartic.r = r;
     quartic.x = common, quartic.y = overlapper::cross(band.along, common);
     // Across both axes, a point of the band is r sin ψ cos γ + t e · (far × common) from the other axis.
     const double along = dot(band.along, overlapper::cross(far.along, common));
@@ -548,7 +626,7 @@ class TwoRounded {
       const Side& side = work_.sides[limit->body];
       const int other = 1 - limit->body, lines = 2 * static_cast<int>(side.bands.size());
       const Band& band = side.bands[(limit->element % lines) / 2];
-      const Vec3 from = end.point - band.from, outward = normal_at(work_.sides[other], features_[other], end.point);
+      const Vec3 from = end.point - band.foot, outward = normal_at(work_.sides[other], features_[other], end.point);
       const bool line = limit->element < lines;
       const Vec3 along = line ? band.along : overlapper::cross(band.along, from) / side.r;
       const double at = line ? dot(from, band.along) : std::atan2(dot(from, band.across), dot(from, band.middle));
@@ -556,113 +634,132 @@ class TwoRounded {
       if (!(std::abs(slope) > kAlike)) return false;
       work_.sides[limit->body].crossings.push_back({limit->element, at, slope > 0, end.point});
     }
+    const double side = forwards > 0 ? 1 : -1;
+    std::array<Target, 2> targets;
     for (const int i : {0, 1}) {
       work_.sides[i].crossed[features_[i]] = 1;
-      const double off = off_surface(i, middle);
-      off_ = std::max(off_, off);
+      targets[i] = {i, features_[i], i == 0 ? side : -side};
     }
-    return integrate(curve, low, high, forwards > 0 ? 1 : -1, 0);
-  }
-
-  double off_surface(int body, Vec3 point) const {
-    const Side& side = work_.sides[body];
-    if (features_[body] < side.first_band())
-      return std::abs(signed_distance(side.facets[features_[body]].plane, point));
-    return side.r * std::abs(std::sqrt(norm2(normal_at(side, features_[body], point))) - 1);
+    return integrate(curve, low, high, targets, 0);
   }
 
   // ------------------------------------------------------------------------------------------------------- integrals
 
-  static constexpr int kTerms = 4;
-  /// The terms of the border of one feature at a point. A facet: twice the area. A band: ∫ over t of 1, cos φ, sin φ. A
-  /// patch: the solid angle, and ∫ u over it.
-  void terms(int body, const At& at, std::array<double, kTerms>& result) const {
-    const Side& side = work_.sides[body];
-    const int feature = features_[body];
+  /// A feature with a curve on its border, and the sign of its direction.
+  struct Target {
+    int body, feature;
+    double sign;
+  };
+  /// Facet: twice the area. Band and patch: ∫ 1, 1 − w · u over φ and t or over the solid angle, and ∫ u over the area.
+  static constexpr int kTerms = 5;
+  using Terms = std::array<double, kTerms>;
+
+  /// The terms of the border of a feature at a point.
+  void terms(const Target& target, const At& at, Terms& result) {
+    const Side& side = work_.sides[target.body];
+    const int feature = target.feature;
+    double height;
     if (feature < side.first_band()) {
       const MovedFacet& facet = side.facets[feature];
-      result = {dot(facet.plane.normal, overlapper::cross(at.point - facet.origin, at.rate)), 0, 0, 0};
+      result = {dot(facet.plane.normal, overlapper::cross(at.point - facet.nearest, at.rate)), 0, 0, 0, 0};
+      height = facet.plane.offset;
     } else if (feature < side.first_patch()) {
       const Band& band = side.bands[feature - side.first_band()];
-      const Vec3 from = at.point - band.from;
-      const double minus_t = band.base - dot(from, band.along);
-      const double x = dot(from, band.middle), y = dot(from, band.across), dx = dot(at.rate, band.middle),
-                   dy = dot(at.rate, band.across);
-      result = {minus_t * (x * dy - y * dx) / (side.r * side.r), minus_t * dy / side.r, -minus_t * dx / side.r, 0};
+      const Vec3 from = at.point - band.foot;
+      const double t = dot(from, band.along), minus_t = band.base - t;
+      const Vec3 out = from - t * band.along, turn = overlapper::cross(at.rate, band.along);
+      const double rate = minus_t * dot(out, turn) / (side.r * side.r);
+      const double versine = norm2(out - side.r * band.toward) / (2 * side.r * side.r);
+      result = {rate, versine * rate, minus_t * turn.x, minus_t * turn.y, minus_t * turn.z};
+      height = band.rise + band.lever * versine;
     } else {
       const Patch& patch = side.patches[feature - side.first_patch()];
-      const Vec3 from = at.point - patch.centre;
-      const Vec3 turn = overlapper::cross(from, at.rate) / (side.r * side.r);
-      result = {dot(patch.pole, turn) / (1 + dot(patch.pole, from) / side.r), turn.x / 2, turn.y / 2, turn.z / 2};
+      const Vec3 out = at.point - patch.centre;
+      const double versine = norm2(out - side.r * patch.toward) / (2 * side.r * side.r);
+      const double rate = dot(patch.toward, overlapper::cross(out, at.rate)) / (side.r * side.r * (2 - versine));
+      const Vec3 swept = 0.5 * overlapper::cross(at.point, at.rate);
+      result = {rate, versine * rate / 2, swept.x, swept.y, swept.z};
+      height = std::abs(patch.rise + patch.lever * versine) + std::sqrt(norm2(patch.aside));
     }
+    height_ = std::max(height_, std::abs(height)), reach_ = std::max(reach_, std::sqrt(norm2(at.point)));
   }
 
   /// What the terms of a feature add to three times the volume, and the sum of the sizes.
-  std::pair<double, double> cone(int body, int feature, const std::array<double, kTerms>& term) const {
-    const Side& side = work_.sides[body];
+  std::pair<double, double> cone(const Target& target, const Terms& term) const {
+    const Side& side = work_.sides[target.body];
+    const int feature = target.feature;
     if (feature < side.first_band()) {
       const double value = side.facets[feature].plane.offset * term[0] / 2;
       return {value, std::abs(value)};
     }
     if (feature < side.first_patch()) {
       const Band& band = side.bands[feature - side.first_band()];
-      const double c = side.r * dot(band.from, band.middle) * term[1],
-                   s = side.r * dot(band.from, band.across) * term[2], one = side.r * side.r * term[0];
-      return {one + c + s, std::abs(one) + std::abs(c) + std::abs(s)};
+      const double plain = side.r * band.rise * term[0], cap = side.r * band.lever * term[1];
+      return {plain + cap, std::abs(plain) + std::abs(cap)};
     }
-    const Vec3 centre = side.patches[feature - side.first_patch()].centre;
-    const double square = side.r * side.r, x = centre.x * term[1], y = centre.y * term[2], z = centre.z * term[3],
-                 angle = side.r * term[0];
-    return {square * (x + y + z + angle), square * (std::abs(x) + std::abs(y) + std::abs(z) + std::abs(angle))};
+    const Patch& patch = side.patches[feature - side.first_patch()];
+    const double square = side.r * side.r, angle = square * patch.rise * term[0], cap = square * patch.lever * term[1];
+    const double x = patch.aside.x * term[2], y = patch.aside.y * term[3], z = patch.aside.z * term[4];
+    return {angle + cap + x + y + z, std::abs(angle) + std::abs(cap) + std::abs(x) + std::abs(y) + std::abs(z)};
   }
 
-  void put(int body, int feature, double sign, const std::array<double, kTerms>& term) {
-    Side& side = work_.sides[body];
-    size_ += cone(body, feature, term).second;
+  void put(const Target& target, const Terms& term) {
+    Side& side = work_.sides[target.body];
+    const int feature = target.feature;
+    const double sign = target.sign;
+    size_ += cone(target, term).second;
     if (feature < side.first_band()) {
       side.facets[feature].twice_area += sign * term[0];
     } else if (feature < side.first_patch()) {
       Band& band = side.bands[feature - side.first_band()];
-      band.plain += sign * term[0], band.cosine += sign * term[1], band.sine += sign * term[2];
+      band.plain += sign * term[0], band.cap += sign * term[1], band.vector += sign * Vec3{term[2], term[3], term[4]};
     } else {
       Patch& patch = side.patches[feature - side.first_patch()];
-      patch.angle += sign * term[0], patch.normals += sign * Vec3{term[1], term[2], term[3]};
+      patch.angle += sign * term[0], patch.cap += sign * term[1],
+          patch.vector += sign * Vec3{term[2], term[3], term[4]};
     }
   }
 
-  bool integrate(const Curve& curve, double low, double high, double sign, int halvings) {
+  bool integrate(const Curve& curve, double low, double high, std::span<const Target> targets, int halvings) {
     if (curve.kind == Curve::Kind::kLine) {
       const At from = curve(low);
       const At whole{from.point, (high - low) * from.rate};
-      for (const int i : {0, 1}) {
-        std::array<double, kTerms> term;
-        terms(i, whole, term);
-        put(i, features_[i], i == 0 ? sign : -sign, term);
+      for (const Target& target : targets) {
+        Terms term;
+        terms(target, whole, term);
+        put(target, term);
       }
+      border_ += high - low, reach_ = std::max(reach_, std::sqrt(norm2(curve(high).point)));
       return true;
     }
     const double span = high - low;
-    if (span < 0.8 && by(slicing::kNodes8, curve, low, high, sign)) return true;
-    if (span < 1.6 && by(slicing::kNodes16, curve, low, high, sign)) return true;
-    if (by(slicing::kNodes32, curve, low, high, sign)) return true;
+    if (span < 0.8 && by(slicing::kNodes8, curve, low, high, targets)) return true;
+    if (span < 1.6 && by(slicing::kNodes16, curve, low, high, targets)) return true;
+    if (by(slicing::kNodes32, curve, low, high, targets)) return true;
     constexpr int kMostHalvings = 6;
     if (halvings == kMostHalvings) return false;
     const double middle = (low + high) / 2;
-    return integrate(curve, low, middle, sign, halvings + 1) && integrate(curve, middle, high, sign, halvings + 1);
+    return integrate(curve, low, middle, targets, halvings + 1) &&
+           integrate(curve, middle, high, targets, halvings + 1);
   }
+
+  /// The largest of the last two terms of a series, relative to the whole.
+  static constexpr double kTail = 1e-8;
 
   /// By a rule of Gauss and Legendre. False if its error counts.
   template <class Rule>
-  bool by(const Rule& rule, const Curve& curve, double low, double high, double sign) {
+  bool by(const Rule& rule, const Curve& curve, double low, double high, std::span<const Target> targets) {
     const double middle = (low + high) / 2, half = (high - low) / 2;
-    std::array<std::array<double, kTerms>, 2> sums{}, sizes{};
+    std::array<Terms, 2> sums{}, sizes{};
     std::array<std::array<slicing::Series, kTerms>, 2> series{};
+    double length = 0;
     for (const slicing::Node& node : rule) {
       const double step = half * (1 - 2 * node.fraction), weight = node.weight / node.sine;
       const At below = curve(middle - step), above = curve(middle + step);
-      for (const int i : {0, 1}) {
-        std::array<double, kTerms> one, other;
-        terms(i, below, one), terms(i, above, other);
+      length += weight * (std::sqrt(norm2(below.rate)) + std::sqrt(norm2(above.rate)));
+      for (size_t i = 0; i < targets.size(); ++i) {
+        Terms one, other;
+        terms(targets[i], below, one), terms(targets[i], above, other);
         for (int k = 0; k < kTerms; ++k) {
           sums[i][k] += weight * (one[k] + other[k]), sizes[i][k] += weight * (std::abs(one[k]) + std::abs(other[k]));
           series[i][k].add(node, one[k], other[k]);
@@ -672,29 +769,22 @@ class TwoRounded {
     // The weights of these nodes are for an integral over cos θ, and for an interval of length 1.
     const double scale = 4 * half / kPi;
     double error = 0;
-    for (const int i : {0, 1}) {
-      const double most = std::ranges::max(sizes[i]) * 2 / kPi;
-      double worst = 0;
-      for (const slicing::Series& s : series[i]) {
-        if (s.tail() > kTail * most) return false;
-        worst = std::max(worst, s.tail());
-      }
+    for (size_t i = 0; i < targets.size(); ++i) {
+      Terms tails;
+      for (int k = 0; k < kTerms; ++k) tails[k] = series[i][k].tail() * kPi / 2;
+      const double tail = cone(targets[i], tails).second, size = cone(targets[i], sizes[i]).second;
+      const double vector = std::max({sizes[i][2], sizes[i][3], sizes[i][4]});
+      if (tail > kTail * size || std::max({tails[2], tails[3], tails[4]}) > kTail * vector) return false;
       // A rule of n nodes integrates the first 2 n terms of the series exactly.
-      if (most > 0) {
-        std::array<double, kTerms> all;
-        all.fill(2 * half * worst * worst / most);
-        error += cone(i, features_[i], all).second;
-      }
+      if (size > 0) error += scale * tail * (tail / size);
     }
-    size_ += error / kOfTermsOfTwo;
-    for (const int i : {0, 1}) {
+    size_ += error / kOfTermsOfTwo, border_ += scale * length;
+    for (size_t i = 0; i < targets.size(); ++i) {
       for (double& sum : sums[i]) sum *= scale;
-      put(i, features_[i], i == 0 ? sign : -sign, sums[i]);
+      put(targets[i], sums[i]);
     }
     return true;
   }
-  /// The largest of the last two terms of a series, relative to the first.
-  static constexpr double kTail = 1e-8;
 
   // -------------------------------------------------------------------------------------------------------- features
 
@@ -706,18 +796,15 @@ class TwoRounded {
   Vec3 point_of(const Side& side, int element, double at) const {
     const int lines = 2 * static_cast<int>(side.bands.size());
     const Band& band = side.bands[(element % lines) / 2];
-    if (element < lines) {
-      const double turn = element % 2 == 0 ? -band.half : band.half;
-      return band.from + at * band.along + side.r * (std::cos(turn) * band.middle + std::sin(turn) * band.across);
-    }
-    const Vec3 end = element % 2 == 0 ? band.from : band.from + band.length * band.along;
-    return end + side.r * (std::cos(at) * band.middle + std::sin(at) * band.across);
+    const bool line = element < lines, first = element % 2 == 0;
+    const double t = line ? at : first ? band.begin : band.end, turn = !line ? at : first ? -band.half : band.half;
+    return band.foot + t * band.along + side.r * (std::cos(turn) * band.middle + std::sin(turn) * band.across);
   }
 
   template <class Holds>
   bool add_side(int body, Holds holds) {
     Side& side = work_.sides[body];
-    const int bands = static_cast<int>(side.bands.size()), lines = 2 * bands, elements = 2 * lines;
+    const int bands = static_cast<int>(side.bands.size()), lines = 2 * bands;
     std::vector<Crossing>& crossings = side.crossings;
     std::ranges::sort(crossings, [](const Crossing& a, const Crossing& b) {
       return a.element != b.element ? a.element < b.element : a.at < b.at;
@@ -725,10 +812,20 @@ class TwoRounded {
     constexpr char kUnknown = 2;
     side.root.resize(side.nodes()), side.inside.assign(side.nodes(), kUnknown);
     std::iota(side.root.begin(), side.root.end(), 0);
+    // Elements in the other body are beside a band near it.
+    std::vector<int>& near = side.elements;
+    near.clear();
+    for (const Around& around : side.around) {
+      const int e = around.feature - side.first_band();
+      if (e < 0 || e >= bands) continue;
+      if (!side.capsule()) near.push_back(2 * e), near.push_back(2 * e + 1);
+      near.push_back(lines + 2 * e), near.push_back(lines + 2 * e + 1);
+    }
+    std::ranges::sort(near);
     // Both features beside an element have found its crossings.
     if (crossings.size() % 2 != 0) return false;
     size_t next = 0;
-    for (int element = side.capsule() ? lines : 0; element < elements; ++element) {
+    for (const int element : near) {
       if (next < crossings.size() && crossings[next].element == element) {
         while (next < crossings.size() && crossings[next].element == element) next += 2;
         continue;
@@ -755,7 +852,8 @@ class TwoRounded {
       if (first && !set(from, one.leaves)) return false;
       if (last && !set(to, !one.leaves)) return false;
     }
-    for (int element = lines; element < elements; ++element) {
+    for (const int element : near) {
+      if (element < lines) continue;
       const auto [from, to] = side.ends_of(element);
       const double half = side.bands[(element - lines) / 2].half;
       for (const auto& [node, at] : {std::pair(from, -half), std::pair(to, half)}) {
@@ -768,64 +866,51 @@ class TwoRounded {
     }
     // The parts of elements in the other body.
     next = 0;
-    for (int element = side.capsule() ? lines : 0; element < elements; ++element) {
+    for (const int element : near) {
       const Band& band = side.bands[(element % lines) / 2];
       const bool line = element < lines;
-      double from = line ? 0 : -band.half;
+      double from = line ? band.begin : -band.half;
       bool inside = side.inside[find(side.root, side.ends_of(element).first)] == 1;
       for (; next < crossings.size() && crossings[next].element == element; next += 2) {
         const double at = (crossings[next].at + crossings[next + 1].at) / 2;
-        if (inside) add_element(body, element, from, at);
+        if (inside && !add_element(body, element, from, at)) return false;
         inside = !inside, from = at;
       }
-      if (inside) add_element(body, element, from, line ? band.length : band.half);
+      if (inside && !add_element(body, element, from, line ? band.end : band.half)) return false;
     }
+    if (next != crossings.size()) return false;
     add_features(body);
     return true;
   }
 
-  void add_element(int body, int element, double from, double to) {
+  bool add_element(int body, int element, double from, double to) {
     Side& side = work_.sides[body];
     const int bands = static_cast<int>(side.bands.size()), lines = 2 * bands, e = (element % lines) / 2;
     const Band& band = side.bands[e];
-    std::array<double, kTerms> term{};
+    const bool first = element % 2 == 0;
+    for (const double at : {from, to}) reach_ = std::max(reach_, std::sqrt(norm2(point_of(side, element, at))));
     if (element < lines) {
-      const bool left = element % 2 == 0;
-      const int f = left ? side.surface->edges[e].left : side.surface->edges[e].right;
-      if (!side.crossed[f]) return;
+      const int f = first ? side.surface->edges[e].left : side.surface->edges[e].right;
+      if (!side.crossed[f]) return true;
       const MovedFacet& facet = side.facets[f];
       // The facet's normal is more exact than the point at the end of the band.
-      const Vec3 start = band.from + side.r * facet.plane.normal - facet.origin;
-      term[0] = dot(facet.plane.normal, overlapper::cross(start, (to - from) * band.along));
-      put(body, f, left ? 1 : -1, term);
-      return;
+      const Vec3 start = band.foot + side.r * facet.plane.normal - facet.nearest;
+      const Vec3 swept = overlapper::cross(start, (to - from) * band.along);
+      put({body, f, first ? 1.0 : -1.0}, {dot(facet.plane.normal, swept), 0, 0, 0, 0});
+      return true;
     }
-    const bool at_from = element % 2 == 0;
-    const double sine = std::sin(to) - std::sin(from), cosine = std::cos(from) - std::cos(to);
-    if (const int f = side.first_band() + e; side.crossed[f]) {
-      const double minus_t = at_from ? band.base : band.base - band.length;
-      if (minus_t != 0) {
-        term = {minus_t * (to - from), minus_t * sine, minus_t * cosine, 0};
-        put(body, f, at_from ? 1 : -1, term);
-      }
-    }
-    const int v = side.capsule() ? (at_from ? 0 : 1)
-                  : at_from      ? side.surface->edges[e].from
-                                 : side.surface->edges[e].to;
-    if (const int f = side.first_patch() + v; side.crossed[f]) {
-      const Vec3 pole = side.patches[v].pole;
-      const auto direction = [&](double at) { return std::cos(at) * band.middle + std::sin(at) * band.across; };
-      // ∫ u × du
-      const Vec3 turn = (to - from) / 2 * band.along;
-      double angle = 0;
-      const int parts = to - from > kPi ? 4 : 1;
-      for (int i = 0; i < parts; ++i) {
-        const double a = from + (to - from) * i / parts, b = from + (to - from) * (i + 1) / parts;
-        angle += solid_angle(pole, direction(a), direction((a + b) / 2), direction(b), b - a);
-      }
-      term = {angle, turn.x, turn.y, turn.z};
-      put(body, f, at_from ? -1 : 1, term);
-    }
+    const auto [at_begin, at_end] = ends_of_band(side, e);
+    std::array<Target, 2> targets;
+    size_t count = 0;
+    const double t = first ? band.begin : band.end, sign = first ? 1 : -1;
+    const int of_band = side.first_band() + e, of_patch = side.first_patch() + (first ? at_begin : at_end);
+    if (side.crossed[of_band] && t != band.base) targets[count++] = {body, of_band, sign};
+    if (side.crossed[of_patch]) targets[count++] = {body, of_patch, -sign};
+    if (count == 0) return true;
+    Curve arc{};
+    arc.kind = Curve::Kind::kConic, arc.start = band.foot + t * band.along;
+    arc.x = side.r * band.middle, arc.y = side.r * band.across;
+    return integrate(arc, from, to, std::span(targets).first(count), 0);
   }
 
   /// Adds the parts of all features in the other body.
@@ -833,200 +918,252 @@ class TwoRounded {
     Side& side = work_.sides[body];
     const int bands = static_cast<int>(side.bands.size());
     const auto holds = [&](int node) { return side.inside[find(side.root, node)] == 1; };
-    const auto finish = [&](int feature, const std::array<double, kTerms>& term, Vec3 vector, double area) {
-      const auto [value, size] = cone(body, feature, term);
-      thrice_ += value, size_ += size, area_ += area, unbalanced_ += vector;
+    const auto finish = [&](int feature, const Terms& term, double area) {
+      const auto [value, size] = cone({body, feature, 1}, term);
+      thrice_ += value, size_ += size, area_ += std::abs(area), unbalanced_ += Vec3{term[2], term[3], term[4]};
     };
-    for (int f = 0; f < side.first_band(); ++f) {
-      MovedFacet& facet = side.facets[f];
-      if (!side.crossed[f]) {
-        if (!holds(side.hull->ring_start[f])) continue;
-        facet.twice_area = 2 * side.surface->facets[f].area;
-      }
-      const double area = facet.twice_area / 2;
-      finish(f, {facet.twice_area, 0, 0, 0}, area * facet.plane.normal, std::abs(area));
-    }
-    for (int e = 0; e < bands; ++e) {
-      Band& band = side.bands[e];
-      const int f = side.first_band() + e;
-      if (!side.crossed[f]) {
-        if (!holds(side.ends_of(4 * bands - 2 * bands + 2 * e).first)) continue;
-        const double chord = side.capsule() ? 0 : side.surface->edges[e].chord;
-        band.plain = 2 * band.half * band.length, band.cosine = chord * band.length;
-      }
-      finish(f, {band.plain, band.cosine, band.sine, 0}, side.r * (band.cosine * band.middle + band.sine * band.across),
-             side.r * std::abs(band.plain));
-    }
-    for (int v = 0; v < static_cast<int>(side.patches.size()); ++v) {
-      Patch& patch = side.patches[v];
-      const int f = side.first_patch() + v;
-      if (!side.crossed[f]) {
-        int element = 2 * bands + v;
-        if (!side.capsule()) {
-          const int e = side.surface->edges_at(v)[0];
-          element = 2 * bands + 2 * e + (side.surface->edges[e].from == v ? 0 : 1);
+    for (const Around& around : side.around) {
+      const int f = around.feature;
+      const bool crossed = side.crossed[f];
+      if (f < side.first_band()) {
+        MovedFacet& facet = side.facets[f];
+        if (!crossed) {
+          if (!holds(side.hull->ring_start[f])) continue;
+          facet.twice_area = 2 * side.surface->facets[f].area;
         }
-        if (!holds(side.ends_of(element).first)) continue;
-        patch.angle = side.capsule() ? 2 * kPi : side.surface->vertices[v].solid_angle;
-        // For a whole patch, the pole is along the normals.
-        patch.normals = (side.capsule() ? kPi : std::sqrt(norm2(side.surface->vertices[v].normals))) * patch.pole;
+        const double area = facet.twice_area / 2;
+        const Vec3 vector = area * facet.plane.normal;
+        finish(f, {facet.twice_area, 0, vector.x, vector.y, vector.z}, area);
+      } else if (f < side.first_patch()) {
+        const int e = f - side.first_band();
+        Band& band = side.bands[e];
+        if (!crossed) {
+          if (!holds(side.ends_of(2 * bands + 2 * e).first)) continue;
+          const double length = band.end - band.begin, chord = side.capsule() ? 0 : side.surface->edges[e].chord;
+          band.plain = 2 * band.half * length, band.vector = side.r * chord * length * band.middle;
+          band.cap = band.plain - dot(band.toward, band.vector) / side.r;
+        }
+        finish(f, {band.plain, band.cap, band.vector.x, band.vector.y, band.vector.z}, side.r * band.plain);
+      } else {
+        const int v = f - side.first_patch();
+        Patch& patch = side.patches[v];
+        const double square = side.r * side.r;
+        if (!crossed) {
+          int element = 2 * bands + v;
+          if (!side.capsule()) {
+            const int e = side.surface->edges_at(v)[0];
+            element = 2 * bands + 2 * e + (side.surface->edges[e].from == v ? 0 : 1);
+          }
+          if (!holds(side.ends_of(element).first)) continue;
+          const Vec3 normals = side.capsule() ? Vec3{0, 0, v == 0 ? -kPi : kPi} : side.surface->vertices[v].normals;
+          patch.angle = side.capsule() ? 2 * kPi : side.surface->vertices[v].solid_angle;
+          patch.vector = square * (side.rotation * normals);
+          patch.cap = patch.angle - dot(patch.toward, patch.vector) / square;
+        }
+        finish(f, {patch.angle, patch.cap, patch.vector.x, patch.vector.y, patch.vector.z}, square * patch.angle);
       }
-      const double square = side.r * side.r;
-      finish(f, {patch.angle, patch.normals.x, patch.normals.y, patch.normals.z}, square * patch.normals,
-             square * std::abs(patch.angle));
     }
   }
 
   TwoWork& work_;
-  double tie_, extent_;
+  bool wide_;
+  double tie_;     ///< m: nearer to a border, nothing is certain
+  double off_;     ///< m: bound of the error of depths
+  double extent_;  ///< m: of a box around the common set
+  double sure_ = wide_ ? 4 * off_ : tie_;
   std::array<int, 2> features_{};
   bool failed_ = false;
-  double thrice_ = 0, size_ = 0, area_ = 0, open_ = 0, off_ = 0;
-  Vec3 unbalanced_;
+  double thrice_ = 0, size_ = 0, area_ = 0;
+  double open_ = 0;                ///< m: sum of the gaps where crossings go on
+  double border_ = 0;              ///< m: length of all crossings
+  double height_ = 0, reach_ = 0;  ///< m: bounds of |x · u| and |x| on crossings
+  Vec3 unbalanced_;                ///< m²
 };
-
-/// The corners of the core about `pose`.
-void place_corners(const Placed& body, const Pose& pose, Side& side) {
-  side.vertices.clear();
-  side.hull = polytope_of(body.shape), side.surface = side.hull ? &offset_surface(*side.hull) : nullptr;
-  side.r = core_radius(body.shape);
-  if (side.hull) {
-    for (const Vec3 v : side.hull->vertices) side.vertices.push_back(pose * v);
-  } else {
-    const double half = revolution(body.shape)->half_length;
-    for (const double z : {-half, half}) side.vertices.push_back(pose * Vec3{0, 0, z});
-  }
-}
-
 void extend(Bounds& box, Vec3 point) { box = {min(box.lower, point), max(box.upper, point)}; }
 constexpr Bounds kNothing{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
 Bounds grown(const Bounds& box, double by) { return {box.lower - by * Vec3{1, 1, 1}, box.upper + by * Vec3{1, 1, 1}}; }
+bool apart(const Bounds& a, const Bounds& b) {
+  return a.lower.x > b.upper.x || b.lower.x > a.upper.x || a.lower.y > b.upper.y || b.lower.y > a.upper.y ||
+         a.lower.z > b.upper.z || b.lower.z > a.upper.z;
+}
 
-/// Places all features about the origin of coordinates. `slack` covers rounding of boxes.
-void place_features(const Mat3& rotation, double slack, Side& side) {
+/// Starts with a body whose origin of coordinates is at `inner`.
+void start(const Placed& body, const WideVector& inner, Side& side) {
+  side.hull = polytope_of(body.shape), side.surface = side.hull ? &offset_surface(*side.hull) : nullptr;
+  side.r = core_radius(body.shape), side.rotation = body.pose.rotation, side.inner = inner;
+  side.half_length = side.hull ? 0 : revolution(body.shape)->half_length;
+  side.vertices.clear();
+  const int count = side.hull ? static_cast<int>(side.hull->vertices.size()) : 2;
+  const Vec3 from = rounded(inner);
+  side.bounds = kNothing;
+  for (int v = 0; v < count; ++v) {
+    side.vertices.push_back(side.rotation * (corner_of(side, v) - from));
+    extend(side.bounds, side.vertices.back());
+  }
+  side.bounds = grown(side.bounds, side.r);
+}
+
+/// Keeps the vertices whose spheres reach below `most` along `normal`.
+void keep_near(Vec3 normal, double most, Side& side) {
+  side.near.resize(side.vertices.size());
+  for (size_t v = 0; v < side.vertices.size(); ++v) side.near[v] = dot(normal, side.vertices[v]) - side.r <= most;
+}
+
+/// Places the features that may reach the box `other`.
+void place_features(bool wide, double slack, const Bounds& other, Side& side) {
   const double r = side.r;
-  side.facets.clear(), side.bands.clear(), side.patches.clear(), side.lines.clear(), side.ends.clear(),
-      side.around.clear(), side.crossings.clear();
-  if (side.capsule()) {
-    const Vec3 way = side.vertices[1] - side.vertices[0], along = rotation * Vec3{0, 0, 1};
-    Band band;
-    band.from = side.vertices[0], band.along = along, band.middle = any_orthogonal(along);
-    band.across = cross(along, band.middle), band.length = norm(way), band.half = kPi;
-    side.bands.push_back(band);
-    side.patches.push_back({side.vertices[0], -along, 0, {}, 0});
-    side.patches.push_back({side.vertices[1], along, 0, {}, 0});
-    side.ends = {{{along, dot(along, side.vertices[0])}, 2}, {{-along, -dot(along, side.vertices[1])}, 3}};
-  } else {
-    const OffsetSurface& surface = *side.surface;
-    const int bands = static_cast<int>(surface.edges.size());
-    for (size_t f = 0; f < surface.facets.size(); ++f) {
-      const Vec3 normal = rotation * surface.facets[f].normal;
-      const double offset = dot(normal, side.vertices[side.hull->facet(static_cast<int>(f))[0]]) + r;
-      side.facets.push_back({{normal, offset}, offset * normal, 0});
-    }
-    for (int e = 0; e < bands; ++e) {
-      const OffsetSurface::Edge& edge = surface.edges[e];
-      Band band;
-      band.from = side.vertices[edge.from], band.along = rotation * edge.along, band.middle = rotation * edge.middle;
-      band.across = cross(band.along, band.middle), band.length = edge.length, band.half = edge.angle / 2;
-      side.bands.push_back(band);
-      const Vec3 to = side.vertices[edge.to];
-      const Vec3 left = cross(band.along, side.facets[edge.left].plane.normal);
-      const Vec3 right = -cross(band.along, side.facets[edge.right].plane.normal);
-      side.lines.push_back({{left, dot(left, band.from)}, 2 * e});
-      side.lines.push_back({{right, dot(right, band.from)}, 2 * e + 1});
-      side.ends.push_back({{band.along, dot(band.along, band.from)}, 2 * bands + 2 * e});
-      side.ends.push_back({{-band.along, -dot(band.along, to)}, 2 * bands + 2 * e + 1});
-    }
-    for (size_t v = 0; v < surface.vertices.size(); ++v)
-      side.patches.push_back({side.vertices[v], unit(rotation * surface.vertices[v].normals), 1, {}, 0});
-  }
-  for (Band& band : side.bands) band.base = std::clamp(-dot(band.from, band.along), 0.0, band.length);
+  const int facets = side.capsule() ? 0 : static_cast<int>(side.surface->facets.size());
+  const int bands = side.capsule() ? 1 : static_cast<int>(side.surface->edges.size());
+  const int patches = static_cast<int>(side.vertices.size());
+  side.facets.resize(facets), side.bands.resize(bands), side.patches.resize(patches);
+  side.lines.resize(2 * bands), side.ends.resize(2 * bands), side.around.clear(), side.crossings.clear();
   side.crossed.assign(side.features(), 0);
-
-  int feature = 0;
-  for (size_t f = 0; f < side.facets.size(); ++f) {
+  const auto keep = [&](const Bounds& box, int feature) {
+    const Bounds large = grown(box, slack);
+    const bool kept = !apart(large, other);
+    if (kept) side.around.push_back({large, feature});
+    return kept;
+  };
+  for (int f = 0; f < facets; ++f) {
+    const auto ring = side.hull->facet(f);
+    MovedFacet& facet = side.facets[f];
+    facet.kept = false;
+    if (std::ranges::none_of(ring, [&](int v) { return side.near[v]; })) continue;
+    facet = {{side.rotation * side.surface->facets[f].normal, 0}, {}, 0, false};
     Bounds box = kNothing;
-    for (const int v : side.hull->facet(static_cast<int>(f))) extend(box, side.vertices[v]);
-    const Vec3 out = r * side.facets[f].plane.normal;
-    side.around.push_back({grown({box.lower + out, box.upper + out}, slack), feature++});
+    for (const int v : ring) extend(box, side.vertices[v]);
+    const Vec3 normal = facet.plane.normal;
+    facet.kept = keep({box.lower + r * normal, box.upper + r * normal}, f);
+    if (!facet.kept) continue;
+    facet.plane.offset = wide ? wide_plane(side, f).offset.head : dot(normal, side.vertices[ring[0]]) + r;
+    facet.nearest = facet.plane.offset * normal;
   }
-  for (const Band& band : side.bands) {
+  for (int e = 0; e < bands; ++e) {
+    const auto [v, w] = ends_of_band(side, e);
+    const bool near = side.capsule() || side.near[v] || side.near[w];
+    const auto kept_facet = [&](int f) { return side.facets[f].kept; };
+    if (!near && !kept_facet(side.surface->edges[e].left) && !kept_facet(side.surface->edges[e].right)) continue;
+    Band& band = side.bands[e];
+    band = {};
+    const Vec3 from = side.vertices[v], to = side.vertices[w];
     Bounds box = kNothing;
     double bulge = r;
     if (side.capsule()) {
+      band.along = side.rotation * Vec3{0, 0, 1}, band.middle = any_orthogonal(band.along), band.half = kPi;
       extend(box, {});
     } else {
-      const double cosine = std::cos(band.half), sine = std::sin(band.half);
-      for (const double s : {-sine, sine}) extend(box, r * (cosine * band.middle + s * band.across));
-      bulge = r * (1 - cosine);
+      const OffsetSurface::Edge& edge = side.surface->edges[e];
+      band.along = side.rotation * edge.along, band.middle = side.rotation * edge.middle, band.half = edge.angle / 2;
+      for (const int f : {edge.left, edge.right}) extend(box, r * side.facets[f].plane.normal);
+      bulge = r * std::max(0.0, 1 - dot(side.facets[edge.left].plane.normal, band.middle));
     }
-    const Vec3 to = band.from + band.length * band.along;
-    box = {box.lower + min(band.from, to), box.upper + max(band.from, to)};
-    side.around.push_back({grown(box, bulge + slack), feature++});
+    box = {box.lower + min(from, to), box.upper + max(from, to)};
+    const bool kept = near && keep(grown(box, bulge), facets + e);
+    const double length = side.capsule() ? 2 * side.half_length : side.surface->edges[e].length;
+    band.across = cross(band.along, band.middle);
+    band.begin = dot(from, band.along), band.end = band.begin + length;
+    band.foot = from - band.begin * band.along;
+    // Patches beside the band are kept if a part of them is near.
+    side.ends[2 * e] = {{band.along, band.begin}, 2 * bands + 2 * e};
+    side.ends[2 * e + 1] = {{-band.along, -band.end}, 2 * bands + 2 * e + 1};
+    if (!side.capsule()) {
+      const OffsetSurface::Edge& edge = side.surface->edges[e];
+      const Vec3 left = cross(band.along, side.facets[edge.left].plane.normal);
+      const Vec3 right = cross(side.facets[edge.right].plane.normal, band.along);
+      side.lines[2 * e] = {{left, dot(left, band.foot)}, 2 * e};
+      side.lines[2 * e + 1] = {{right, dot(right, band.foot)}, 2 * e + 1};
+    }
+    if (!kept) continue;
+    band.base = std::clamp(0.0, band.begin, band.end);
+    band.lever = std::sqrt(norm2(band.foot));
+    band.toward = band.lever > 0 ? -band.foot / band.lever : band.middle;
+    band.rise = wide ? wide_rise_of_band(side, e) : r - band.lever;
   }
-  for (size_t v = 0; v < side.patches.size(); ++v) {
+  for (int v = 0; v < patches; ++v) {
+    if (!side.near[v]) continue;
     Patch& patch = side.patches[v];
+    patch = {};
+    patch.centre = side.vertices[v];
     Bounds box = kNothing;
-    if (!side.capsule())
-      for (const int e : side.surface->edges_at(static_cast<int>(v))) {
-        const OffsetSurface::Edge& edge = side.surface->edges[e];
-        for (const int f : {edge.left, edge.right}) {
+    Vec3 pole{};
+    double least = side.capsule() ? 0 : 1;
+    if (side.capsule()) {
+      pole = v == 0 ? -side.bands[0].along : side.bands[0].along;
+    } else {
+      pole = unit(side.rotation * side.surface->vertices[v].normals);
+      for (const int e : side.surface->edges_at(v))
+        for (const int f : {side.surface->edges[e].left, side.surface->edges[e].right}) {
           const Vec3 normal = side.facets[f].plane.normal;
-          patch.least = std::min(patch.least, dot(normal, patch.pole)), extend(box, r * normal);
+          least = std::min(least, dot(normal, pole)), extend(box, r * normal);
         }
-      }
+    }
     // All normals are in the cap about the pole, and in the hull of the corners' normals but for its bulge.
     constexpr double kWide = 0.5;
-    const bool wide = patch.least < kWide;
-    if (wide) box = {{}, {}};
+    const bool large = least < kWide;
+    if (large) box = {{}, {}};
     box = {box.lower + patch.centre, box.upper + patch.centre};
-    side.around.push_back({grown(box, (wide ? r : r * (1 - patch.least)) + slack), feature++});
+    if (!keep(grown(box, large ? r : r * std::max(0.0, 1 - least)), facets + bands + v)) continue;
+    const double distance = std::sqrt(norm2(patch.centre));
+    const Vec3 toward = distance > 0 ? -patch.centre / distance : pole;
+    // The direction to the origin, unless a normal may be nearly opposite.
+    constexpr double kFarOff = 0.5;
+    if (dot(toward, pole) > kFarOff) {
+      patch.toward = toward, patch.lever = distance;
+      patch.rise = wide ? wide_rise_of_patch(side, v) : r - distance;
+    } else {
+      patch.toward = pole, patch.lever = -dot(patch.centre, pole), patch.rise = r - patch.lever;
+      patch.aside = patch.centre + patch.lever * pole;
+    }
   }
-  side.bounds = kNothing;
-  for (const Around& around : side.around) extend(side.bounds, around.box.lower), extend(side.bounds, around.box.upper);
+  std::ranges::sort(side.around, {}, [](const Around& around) { return around.box.lower.x; });
 }
 
 }  // namespace
 
-std::optional<VolumeAlone> volume_of_two_rounded(const Placed& a, const Placed& b) {
+std::optional<VolumeAlone> volume_of_two_rounded(const Placed& a, const Placed& b, const std::optional<Vec3>& between) {
   const std::array<const Placed*, 2> bodies{&a, &b};
   const Scratch<TwoWork> work;
   auto& sides = work->sides;
-  Pose relative = relative_pose(a.pose, b.pose);
-  place_corners(a, {}, sides[0]), place_corners(b, relative, sides[1]);
-  std::array<Bounds, 2> bounds{kNothing, kNothing};
-  for (const int i : {0, 1}) {
-    if (!sides[i].capsule() && !sides[i].surface->exact) return std::nullopt;
-    for (const Vec3 v : sides[i].vertices) extend(bounds[i], v);
-    bounds[i] = grown(bounds[i], sides[i].r);
+  for (const Placed* body : bodies)
+    if (const HullData* hull = polytope_of(body->shape); hull && !offset_surface(*hull).exact) return std::nullopt;
+  const double apart = norm(a.pose.translation - b.pose.translation), size = apart + reach(a.shape) + reach(b.shape);
+  Vec3 origin;
+  if (between) {
+    origin = *between;
+  } else {
+    const Bounds of_a = bounds(a), of_b = bounds(b);
+    origin = 0.5 * (max(of_a.lower, of_b.lower) + min(of_a.upper, of_b.upper));
   }
-  const Vec3 lower = max(bounds[0].lower, bounds[1].lower), upper = min(bounds[0].upper, bounds[1].upper);
-  const Vec3 origin = 0.5 * (lower + upper);
-  const double extent = norm(upper - lower);
-  const double size = norm(a.pose.translation - b.pose.translation) + reach(a.shape) + reach(b.shape);
-  const double off = rounding(reach(a, reach(b, size))), tie = 4 * off;
-  for (const int i : {0, 1}) {
-    for (Vec3& v : sides[i].vertices) v -= origin;
-    place_features(i == 0 ? Mat3{} : relative.rotation, tie, sides[i]);
-  }
-  for (const int i : {0, 1}) {
-    const Bounds other = sides[1 - i].bounds;
-    std::erase_if(sides[i].around, [&](const Around& around) {
-      const Bounds& box = around.box;
-      return box.lower.x > other.upper.x || other.lower.x > box.upper.x || box.lower.y > other.upper.y ||
-             other.lower.y > box.upper.y || box.lower.z > other.upper.z || other.lower.z > box.upper.z;
-    });
-    std::ranges::sort(sides[i].around, {}, [](const Around& around) { return around.box.lower.x; });
-  }
-  TwoRounded both(*work, tie, extent);
+  // The origin has exact coordinates in the first body's core.
+  const Vec3 inner = apply_transposed(a.pose.rotation, origin - a.pose.translation);
+  for (const int i : {0, 1}) sides[i].wide_rotation = wide_rotation(bodies[i]->orientation);
+  const WideVector in_other =
+      apply_transposed(sides[1].wide_rotation, sides[0].wide_rotation * (wide(inner) + wide(data_origin(a.shape))) +
+                                                   wide_difference(a.position, b.position)) -
+      wide(data_origin(b.shape));
+  start(a, wide(inner), sides[0]), start(b, in_other, sides[1]);
+  const double rounded_off = rounding(reach(a, reach(b, size)));
+  const bool wide_too = between.has_value();
+  const double off = wide_too ? wide_placing(reach(a, reach(b, size)), true) : rounded_off;
+  const Bounds common{max(sides[0].bounds.lower, sides[1].bounds.lower),
+                      min(sides[0].bounds.upper, sides[1].bounds.upper)};
+  const double extent = norm(common.upper - common.lower), slack = 4 * rounded_off;
+  const double tie = wide_too ? 16 * kUnit * (sides[0].r + sides[1].r + extent) : slack;
+  // No point of a body is beyond its own plane across this direction.
+  const Vec3 way = between ? a.tightest(origin).normal : unit(b.pose.translation - a.pose.translation);
+  double highest = -kInfinity, lowest = kInfinity;
+  for (const Vec3 v : sides[0].vertices) highest = std::max(highest, dot(way, v) + sides[0].r);
+  for (const Vec3 v : sides[1].vertices) lowest = std::min(lowest, dot(way, v) - sides[1].r);
+  keep_near(-way, -lowest + slack, sides[0]), keep_near(way, highest + slack, sides[1]);
+  for (const int i : {0, 1}) place_features(wide_too, slack, sides[1 - i].bounds, sides[i]);
+  TwoRounded both(*work, wide_too, tie, off, extent);
   if (!both.cross_all()) return std::nullopt;
   const auto holds = [&](int body, Vec3 point) {
-    const Vec3 placed = a.pose * (point + origin);
+    const Vec3 placed = point + origin;
     return signed_distance(bodies[body]->tightest(placed), placed);
   };
   if (!both.add_all(holds)) return std::nullopt;
-  const VolumeAlone found{both.volume(), both.error(off)};
+  const VolumeAlone found{both.volume(), both.error()};
   if (!(found.volume > 0 && found.error <= kEnough * found.volume)) return std::nullopt;
   return found;
 }
