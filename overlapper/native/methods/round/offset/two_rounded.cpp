@@ -23,6 +23,8 @@ namespace {
 
 /// Rounding of a term, relative to its size. No term takes more than 60 operations that each may round.
 constexpr double kOfTermsOfTwo = 64 * kUnit;
+/// Rounding of a point of a crossing, relative to its distances from the origin and from centres.
+constexpr double kOfPlaces = 8 * kUnit;
 /// Directions that differ less have no certain cross product.
 constexpr double kAlike = 1e-7;
 constexpr double kAlikeAxes = 1e-3;
@@ -66,6 +68,7 @@ struct Crossing {
   double at;  ///< t or φ
   bool leaves;
   Vec3 point;
+  double height;  ///< m: bound of |x · u| at features beside it
 };
 struct Around {
   Bounds box;
@@ -171,6 +174,7 @@ struct Curve {
   Vec3 e;
   double r = 0, slant = 0, stretch = 1, p = 0, p1 = 0, q = 1, q1 = 0, kappa = 1, sign = 1;
   bool closed = false;
+  double loss = 1;  ///< error of a point, relative to that of a place
 
   At operator()(double s) const {
     if (kind == Kind::kLine) return {start + s * x, x};
@@ -230,9 +234,10 @@ class TwoRounded {
 
   double volume() const { return thrice_ / 3; }
   double error() const {
-    const double least = std::min(extent_, reach_);
-    return off_ * area_ + kOfTermsOfTwo * size_ + norm(unbalanced_) * least +
-           (open_ * least + tie_ * border_) * height_;
+    const double reach = std::min(extent_, reach_), off_place = kOfPlaces * (largest_ + reach);
+    // Rounding of places leaves area vectors that do not add up to zero, but that is not an error of the volume.
+    const double unbalanced = std::max(0.0, norm(unbalanced_) - off_place * border_);
+    return off_ * area_ + (kOfTermsOfTwo * size_ + open_ * reach + off_place * raised_) / 3 + unbalanced * reach;
   }
 
  private:
@@ -296,6 +301,7 @@ class TwoRounded {
     const double square = norm2(way);
     if (!(square > kAlike * kAlike)) return false;
     Curve line{};
+    line.loss = 1 / std::sqrt(square);
     line.kind = Curve::Kind::kLine, line.x = way / std::sqrt(square);
     line.start =
         (one.offset * overlapper::cross(other.normal, way) + other.offset * overlapper::cross(way, one.normal)) /
@@ -333,6 +339,7 @@ class TwoRounded {
       const Band& band = side.bands[feature - side.first_band()];
       const double slope = dot(plane.normal, band.along);
       if (std::abs(slope) < kAlike) return false;
+      conic.loss = 1 / std::abs(slope);
       const auto along_plane = [&](Vec3 way) { return way - dot(plane.normal, way) / slope * band.along; };
       conic.start = band.foot - signed_distance(plane, band.foot) / slope * band.along;
       conic.x = side.r * along_plane(band.middle), conic.y = side.r * along_plane(band.across);
@@ -467,7 +474,7 @@ class TwoRounded {
     // Across both axes, a point of the band is r sin ψ cos γ + t e · (far × common) from the other axis.
     const double along = dot(band.along, overlapper::cross(far.along, common));
     const double turned = dot(quartic.y, overlapper::cross(far.along, common));
-    quartic.slant = -r * turned / along, quartic.stretch = 1 / along;
+    quartic.slant = -r * turned / along, quartic.stretch = 1 / along, quartic.loss = 1 / sine;
     quartic.p = depth, quartic.p1 = 2 * r, quartic.q = ball - r + distance, quartic.q1 = 2 * r;
     return divide_quartic(quartic, body, band);
   }
@@ -612,6 +619,15 @@ class TwoRounded {
     work_.roots.push_back({at, l});
   }
 
+  /// A feature with a curve on its border, and the sign of its direction.
+  struct Target {
+    int body, feature;
+    double sign;
+  };
+  /// Facet: twice the area. Band and patch: ∫ 1, 1 − w · u over φ and t or over the solid angle, and ∫ u over the area.
+  static constexpr int kTerms = 5;
+  using Terms = std::array<double, kTerms>;
+
   /// Adds a part of a curve to the borders of both features.
   bool add(const Curve& curve, double low, double high, const Limit& first, const Limit& last) {
     const Vec3 middle = curve((low + high) / 2).point, rate = curve((low + high) / 2).rate;
@@ -632,7 +648,10 @@ class TwoRounded {
       const double at = line ? dot(from, band.along) : std::atan2(dot(from, band.across), dot(from, band.middle));
       const double slope = dot(along, outward);
       if (!(std::abs(slope) > kAlike)) return false;
-      work_.sides[limit->body].crossings.push_back({limit->element, at, slope > 0, end.point});
+      double height = 0;
+      Terms unused;
+      for (const int i : {0, 1}) height = std::max(height, terms({i, features_[i], 1}, end, unused));
+      work_.sides[limit->body].crossings.push_back({limit->element, at, slope > 0, end.point, height});
     }
     const double side = forwards > 0 ? 1 : -1;
     std::array<Target, 2> targets;
@@ -645,17 +664,8 @@ class TwoRounded {
 
   // ------------------------------------------------------------------------------------------------------- integrals
 
-  /// A feature with a curve on its border, and the sign of its direction.
-  struct Target {
-    int body, feature;
-    double sign;
-  };
-  /// Facet: twice the area. Band and patch: ∫ 1, 1 − w · u over φ and t or over the solid angle, and ∫ u over the area.
-  static constexpr int kTerms = 5;
-  using Terms = std::array<double, kTerms>;
-
-  /// The terms of the border of a feature at a point.
-  void terms(const Target& target, const At& at, Terms& result) {
+  /// Finds the terms of the border of a feature at a point. Returns a bound of |x · u|.
+  double terms(const Target& target, const At& at, Terms& result) {
     const Side& side = work_.sides[target.body];
     const int feature = target.feature;
     double height;
@@ -681,7 +691,7 @@ class TwoRounded {
       result = {rate, versine * rate / 2, swept.x, swept.y, swept.z};
       height = std::abs(patch.rise + patch.lever * versine) + std::sqrt(norm2(patch.aside));
     }
-    height_ = std::max(height_, std::abs(height)), reach_ = std::max(reach_, std::sqrt(norm2(at.point)));
+    return std::abs(height);
   }
 
   /// What the terms of a feature add to three times the volume, and the sum of the sizes.
@@ -726,10 +736,11 @@ class TwoRounded {
       const At whole{from.point, (high - low) * from.rate};
       for (const Target& target : targets) {
         Terms term;
-        terms(target, whole, term);
+        raised_ += curve.loss * (high - low) * terms(target, whole, term);
         put(target, term);
       }
-      border_ += high - low, reach_ = std::max(reach_, std::sqrt(norm2(curve(high).point)));
+      border_ += curve.loss * (high - low);
+      for (const double s : {low, high}) reach_ = std::max(reach_, std::sqrt(norm2(curve(s).point)));
       return true;
     }
     const double span = high - low;
@@ -752,14 +763,16 @@ class TwoRounded {
     const double middle = (low + high) / 2, half = (high - low) / 2;
     std::array<Terms, 2> sums{}, sizes{};
     std::array<std::array<slicing::Series, kTerms>, 2> series{};
-    double length = 0;
+    double length = 0, raised = 0, farthest = 0;
     for (const slicing::Node& node : rule) {
       const double step = half * (1 - 2 * node.fraction), weight = node.weight / node.sine;
       const At below = curve(middle - step), above = curve(middle + step);
-      length += weight * (std::sqrt(norm2(below.rate)) + std::sqrt(norm2(above.rate)));
+      const double before = weight * std::sqrt(norm2(below.rate)), after = weight * std::sqrt(norm2(above.rate));
+      length += before + after;
+      farthest = std::max({farthest, norm2(below.point), norm2(above.point)});
       for (size_t i = 0; i < targets.size(); ++i) {
         Terms one, other;
-        terms(targets[i], below, one), terms(targets[i], above, other);
+        raised += before * terms(targets[i], below, one) + after * terms(targets[i], above, other);
         for (int k = 0; k < kTerms; ++k) {
           sums[i][k] += weight * (one[k] + other[k]), sizes[i][k] += weight * (std::abs(one[k]) + std::abs(other[k]));
           series[i][k].add(node, one[k], other[k]);
@@ -778,7 +791,8 @@ class TwoRounded {
       // A rule of n nodes integrates the first 2 n terms of the series exactly.
       if (size > 0) error += scale * tail * (tail / size);
     }
-    size_ += error / kOfTermsOfTwo, border_ += scale * length;
+    size_ += error / kOfTermsOfTwo, border_ += curve.loss * scale * length;
+    raised_ += curve.loss * scale * raised, reach_ = std::max(reach_, std::sqrt(farthest));
     for (size_t i = 0; i < targets.size(); ++i) {
       for (double& sum : sums[i]) sum *= scale;
       put(targets[i], sums[i]);
@@ -844,7 +858,7 @@ class TwoRounded {
       const double apart = std::sqrt(norm2(one.point - other.point));
       constexpr double kFar = 1e-9;
       if (one.element != other.element || one.leaves != other.leaves || apart > kFar * extent_) return false;
-      open_ += apart;
+      open_ += apart * std::max(one.height, other.height);
       const auto [from, to] = side.ends_of(one.element);
       const bool first = i == 0 || crossings[i - 1].element != one.element;
       const bool last = i + 2 == crossings.size() || crossings[i + 2].element != one.element;
@@ -971,13 +985,15 @@ class TwoRounded {
   double off_;     ///< m: bound of the error of depths
   double extent_;  ///< m: of a box around the common set
   double sure_ = wide_ ? 4 * off_ : tie_;
+  double largest_ = std::max(work_.sides[0].r, work_.sides[1].r);
   std::array<int, 2> features_{};
   bool failed_ = false;
   double thrice_ = 0, size_ = 0, area_ = 0;
-  double open_ = 0;                ///< m: sum of the gaps where crossings go on
-  double border_ = 0;              ///< m: length of all crossings
-  double height_ = 0, reach_ = 0;  ///< m: bounds of |x · u| and |x| on crossings
-  Vec3 unbalanced_;                ///< m²
+  double open_ = 0;    ///< m²: sum of the gaps where crossings go on, by |x · u|
+  double border_ = 0;  ///< m: length of all crossings, by their loss
+  double raised_ = 0;  ///< m²: the same, by |x · u| too
+  double reach_ = 0;   ///< m: bound of |x| on crossings
+  Vec3 unbalanced_;    ///< m²
 };
 void extend(Bounds& box, Vec3 point) { box = {min(box.lower, point), max(box.upper, point)}; }
 constexpr Bounds kNothing{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
@@ -1061,8 +1077,15 @@ void place_features(bool wide, double slack, const Bounds& other, Side& side) {
     const bool kept = near && keep(grown(box, bulge), facets + e);
     const double length = side.capsule() ? 2 * side.half_length : side.surface->edges[e].length;
     band.across = cross(band.along, band.middle);
-    band.begin = dot(from, band.along), band.end = band.begin + length;
-    band.foot = from - band.begin * band.along;
+    if (wide) {
+      const WideVector begin = wide_corner(side, v), along = wide_along(side, e);
+      const DoubleDouble t = dot(begin, along);
+      band.begin = t.head, band.end = dot(wide_corner(side, w), along).head;
+      band.foot = side.rotation * rounded(begin - t * along);
+    } else {
+      band.begin = dot(from, band.along), band.end = band.begin + length;
+      band.foot = from - band.begin * band.along;
+    }
     // Patches beside the band are kept if a part of them is near.
     side.ends[2 * e] = {{band.along, band.begin}, 2 * bands + 2 * e};
     side.ends[2 * e + 1] = {{-band.along, -band.end}, 2 * bands + 2 * e + 1};
@@ -1083,7 +1106,7 @@ void place_features(bool wide, double slack, const Bounds& other, Side& side) {
     if (!side.near[v]) continue;
     Patch& patch = side.patches[v];
     patch = {};
-    patch.centre = side.vertices[v];
+    patch.centre = wide ? side.rotation * rounded(wide_corner(side, v)) : side.vertices[v];
     Bounds box = kNothing;
     Vec3 pole{};
     double least = side.capsule() ? 0 : 1;
