@@ -93,6 +93,7 @@ struct Side {
   std::vector<Around> around;
   std::vector<Crossing> crossings;
   std::vector<char> crossed;  ///< for each feature
+  std::vector<char> refined;  ///< for each feature: 1 if its numbers come from double-doubles
   std::vector<int> elements;  ///< that may be in the other body
   std::vector<int> root;      ///< of nodes that elements without a crossing join
   std::vector<char> inside;   ///< for each node: 0, 1 or 2 if not known
@@ -134,11 +135,36 @@ WidePlane wide_plane(const Side& side, int f) {
   const WideVector normal = unit(wide_normal(corners[a], corners[b], corners[c]));
   return {normal, dot(normal, wide(corners[a]) - side.inner) + DoubleDouble{side.r}};
 }
-/// m: how far the surface of a cylinder or a sphere lies beyond the origin.
-double wide_rise_of_band(const Side& side, int e) {
-  return (DoubleDouble{side.r} - norm(cross(wide_corner(side, ends_of_band(side, e).first), wide_along(side, e)))).head;
+void aim(Band& band) {
+  band.base = std::clamp(0.0, band.begin, band.end);
+  band.lever = std::sqrt(norm2(band.foot));
+  band.toward = band.lever > 0 ? -band.foot / band.lever : band.middle;
 }
-double wide_rise_of_patch(const Side& side, int v) { return (DoubleDouble{side.r} - norm(wide_corner(side, v))).head; }
+
+/// Takes the distances of a feature from the origin from double-doubles.
+void refine(int feature, Side& side) {
+  if (std::exchange(side.refined[feature], 1)) return;
+  if (feature < side.first_band()) {
+    MovedFacet& facet = side.facets[feature];
+    facet.plane.offset = wide_plane(side, feature).offset.head, facet.nearest = facet.plane.offset * facet.plane.normal;
+  } else if (feature < side.first_patch()) {
+    const int e = feature - side.first_band();
+    Band& band = side.bands[e];
+    const auto [from, to] = ends_of_band(side, e);
+    const WideVector begin = wide_corner(side, from), along = wide_along(side, e);
+    const DoubleDouble t = dot(begin, along);
+    const WideVector foot = begin - t * along;
+    band.begin = t.head, band.end = dot(wide_corner(side, to), along).head, band.foot = side.rotation * rounded(foot);
+    aim(band);
+    band.rise = (DoubleDouble{side.r} - norm(foot)).head;
+    if (!side.capsule())
+      for (const int i : {2 * e, 2 * e + 1}) side.lines[i].plane.offset = dot(side.lines[i].plane.normal, band.foot);
+  } else {
+    const int v = feature - side.first_patch();
+    Patch& patch = side.patches[v];
+    if (patch.aside == Vec3{}) patch.rise = (DoubleDouble{side.r} - norm(wide_corner(side, v))).head;
+  }
+}
 
 struct Limit {
   Plane plane;
@@ -157,6 +183,7 @@ struct TwoWork {
   std::vector<Limit> limits;
   std::vector<Root> roots;
   std::vector<int> doubtful;
+  std::vector<std::array<int, 2>> pairs;  ///< of features that may cross
 };
 
 struct At {
@@ -206,22 +233,29 @@ class TwoRounded {
       : work_(work), wide_(wide), tie_(tie), off_(off), extent_(extent) {}
 
   bool cross_all() {
-    std::array<std::span<const Around>, 2> around{work_.sides[0].around, work_.sides[1].around};
+    const std::array<std::span<const Around>, 2> around{work_.sides[0].around, work_.sides[1].around};
+    work_.pairs.clear();
     size_t i = 0, k = 0;
     // The box that begins first is compared with all boxes of the other body that begin before its end.
     while (i < around[0].size() && k < around[1].size()) {
       const bool first = around[0][i].box.lower.x <= around[1][k].box.lower.x;
       const Around& one = first ? around[0][i] : around[1][k];
-      const std::span<const Around> others = first ? around[1].subspan(k) : around[0].subspan(i);
-      for (const Around& other : others) {
+      const Side &side = work_.sides[first ? 0 : 1], &others = work_.sides[first ? 1 : 0];
+      for (const Around& other : first ? around[1].subspan(k) : around[0].subspan(i)) {
         if (other.box.lower.x > one.box.upper.x) break;
         if (other.box.lower.y > one.box.upper.y || one.box.lower.y > other.box.upper.y) continue;
         if (other.box.lower.z > one.box.upper.z || one.box.lower.z > other.box.upper.z) continue;
-        if (!(first ? cross(one, other) : cross(other, one))) return false;
+        if (misses(side, one.feature, other.box) || misses(others, other.feature, one.box)) continue;
+        if (first) work_.pairs.push_back({one.feature, other.feature});
+        else work_.pairs.push_back({other.feature, one.feature});
       }
       first ? ++i : ++k;
     }
-    return true;
+    if (wide_)
+      for (const std::array<int, 2>& pair : work_.pairs)
+        for (const int body : {0, 1}) refine(pair[body], work_.sides[body]);
+    cancellation_point(work_.pairs.size());
+    return std::ranges::all_of(work_.pairs, [&](const std::array<int, 2>& pair) { return cross(pair); });
   }
 
   /// `holds(i, point)` is the distance of a point from body i, negative inside.
@@ -253,42 +287,67 @@ class TwoRounded {
     return (point - side.patches[feature - side.first_patch()].centre) / side.r;
   }
 
-  void append_limits(int body, int feature, bool lines) {
-    const Side& side = work_.sides[body];
-    const auto put = [&](const Border& border, double sign) {
-      work_.limits.push_back({{sign * border.plane.normal, sign * border.plane.offset}, border.element, body});
-    };
+  /// Calls f(border, sign) for the planes around a feature. The feature is where they are negative, by their sign.
+  template <class F>
+  static void for_borders(const Side& side, int feature, F f) {
     if (feature < side.first_band()) {
       const int begin = side.hull->ring_start[feature], end = side.hull->ring_start[feature + 1];
-      for (int k = begin; k < end; ++k) put(side.lines[side.surface->sides[k]], 1);
+      for (int k = begin; k < end; ++k) f(side.lines[side.surface->sides[k]], 1);
     } else if (feature < side.first_patch()) {
       const int e = feature - side.first_band();
-      if (lines && !side.capsule()) put(side.lines[2 * e], -1), put(side.lines[2 * e + 1], -1);
-      put(side.ends[2 * e], -1), put(side.ends[2 * e + 1], -1);
+      f(side.ends[2 * e], -1), f(side.ends[2 * e + 1], -1);
+      if (!side.capsule()) f(side.lines[2 * e], -1), f(side.lines[2 * e + 1], -1);
     } else if (side.capsule()) {
-      put(side.ends[feature - side.first_patch()], 1);
+      f(side.ends[feature - side.first_patch()], 1);
     } else {
       const int v = feature - side.first_patch();
-      for (const int e : side.surface->edges_at(v))
-        put(side.ends[2 * e + (side.surface->edges[e].from == v ? 0 : 1)], 1);
+      for (const int e : side.surface->edges_at(v)) f(side.ends[2 * e + (side.surface->edges[e].from == v ? 0 : 1)], 1);
     }
   }
 
+  void append_limits(int body, int feature, bool lines) {
+    const Side& side = work_.sides[body];
+    const int count = lines ? 0 : 2 * static_cast<int>(side.bands.size());
+    for_borders(side, feature, [&](const Border& border, double sign) {
+      if (border.element < count) return;
+      work_.limits.push_back({{sign * border.plane.normal, sign * border.plane.offset}, border.element, body});
+    });
+  }
+
+  /// True if a feature certainly has no point in a box.
+  static bool misses(const Side& side, int feature, const Bounds& box) {
+    const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
+    bool beyond = false;
+    if (feature < side.first_band()) {
+      const Plane& plane = side.facets[feature].plane;
+      if (std::abs(signed_distance(plane, middle)) > dot(abs(plane.normal), half)) return true;
+    } else {
+      Vec3 from;
+      if (feature < side.first_patch()) {
+        const Band& band = side.bands[feature - side.first_band()];
+        from = middle - band.foot;
+        from -= dot(from, band.along) * band.along;
+      } else {
+        from = middle - side.patches[feature - side.first_patch()].centre;
+      }
+      const double distance = std::sqrt(norm2(from)), size = std::sqrt(norm2(half));
+      if (std::abs(distance - side.r) > size) return true;
+    }
+    for_borders(side, feature, [&](const Border& border, double sign) {
+      beyond = beyond || sign * signed_distance(border.plane, middle) > dot(abs(border.plane.normal), half);
+    });
+    return beyond;
+  }
+
   /// Adds where the features of the two bodies cross. False if that is not certain.
-  bool cross(const Around& one, const Around& other) {
+  bool cross(const std::array<int, 2>& features) {
     const Side &a = work_.sides[0], &b = work_.sides[1];
-    features_ = {one.feature, other.feature};
-    const bool facet_a = one.feature < a.first_band(), facet_b = other.feature < b.first_band();
-    const auto beside = [](const Plane& plane, const Bounds& box) {
-      const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
-      return std::abs(signed_distance(plane, middle)) > dot(abs(plane.normal), half);
-    };
-    if (facet_a && beside(a.facets[one.feature].plane, other.box)) return true;
-    if (facet_b && beside(b.facets[other.feature].plane, one.box)) return true;
+    features_ = features;
+    const bool facet_a = features[0] < a.first_band(), facet_b = features[1] < b.first_band();
     if (facet_a && facet_b) return cross_facets();
     if (facet_a) return cross_facet(0);
     if (facet_b) return cross_facet(1);
-    const bool band_a = one.feature < a.first_patch(), band_b = other.feature < b.first_patch();
+    const bool band_a = features[0] < a.first_patch(), band_b = features[1] < b.first_patch();
     if (band_a && band_b) return cross_bands();
     if (band_a) return cross_band_and_patch(0);
     if (band_b) return cross_band_and_patch(1);
@@ -787,9 +846,12 @@ class TwoRounded {
       for (int k = 0; k < kTerms; ++k) tails[k] = series[i][k].tail() * kPi / 2;
       const double tail = cone(targets[i], tails).second, size = cone(targets[i], sizes[i]).second;
       const double vector = std::max({sizes[i][2], sizes[i][3], sizes[i][4]});
-      if (tail > kTail * size || std::max({tails[2], tails[3], tails[4]}) > kTail * vector) return false;
+      // Terms that rounding alone leaves do not fall. That rounding counts as that of places.
+      const double of_places = kOfPlaces * largest_;
+      if (tail > std::max(kTail * size, of_places * raised)) return false;
+      if (std::max({tails[2], tails[3], tails[4]}) > std::max(kTail * vector, of_places * length)) return false;
       // A rule of n nodes integrates the first 2 n terms of the series exactly.
-      if (size > 0) error += scale * tail * (tail / size);
+      if (size > 0) error += scale * tail * std::min(1.0, tail / size);
     }
     size_ += error / kOfTermsOfTwo, border_ += curve.loss * scale * length;
     raised_ += curve.loss * scale * raised, reach_ = std::max(reach_, std::sqrt(farthest));
@@ -943,6 +1005,7 @@ class TwoRounded {
         MovedFacet& facet = side.facets[f];
         if (!crossed) {
           if (!holds(side.hull->ring_start[f])) continue;
+          if (wide_) refine(f, side);
           facet.twice_area = 2 * side.surface->facets[f].area;
         }
         const double area = facet.twice_area / 2;
@@ -953,6 +1016,7 @@ class TwoRounded {
         Band& band = side.bands[e];
         if (!crossed) {
           if (!holds(side.ends_of(2 * bands + 2 * e).first)) continue;
+          if (wide_) refine(f, side);
           const double length = band.end - band.begin, chord = side.capsule() ? 0 : side.surface->edges[e].chord;
           band.plain = 2 * band.half * length, band.vector = side.r * chord * length * band.middle;
           band.cap = band.plain - dot(band.toward, band.vector) / side.r;
@@ -969,6 +1033,7 @@ class TwoRounded {
             element = 2 * bands + 2 * e + (side.surface->edges[e].from == v ? 0 : 1);
           }
           if (!holds(side.ends_of(element).first)) continue;
+          if (wide_) refine(f, side);
           const Vec3 normals = side.capsule() ? Vec3{0, 0, v == 0 ? -kPi : kPi} : side.surface->vertices[v].normals;
           patch.angle = side.capsule() ? 2 * kPi : side.surface->vertices[v].solid_angle;
           patch.vector = square * (side.rotation * normals);
@@ -1010,10 +1075,11 @@ void start(const Placed& body, const WideVector& inner, Side& side) {
   side.half_length = side.hull ? 0 : revolution(body.shape)->half_length;
   side.vertices.clear();
   const int count = side.hull ? static_cast<int>(side.hull->vertices.size()) : 2;
-  const Vec3 from = rounded(inner);
+  // Two differences keep the digits near the origin.
+  const Vec3 from = rounded(inner), rest = tail(inner);
   side.bounds = kNothing;
   for (int v = 0; v < count; ++v) {
-    side.vertices.push_back(side.rotation * (corner_of(side, v) - from));
+    side.vertices.push_back(side.rotation * ((corner_of(side, v) - from) - rest));
     extend(side.bounds, side.vertices.back());
   }
   side.bounds = grown(side.bounds, side.r);
@@ -1026,14 +1092,14 @@ void keep_near(Vec3 normal, double most, Side& side) {
 }
 
 /// Places the features that may reach the box `other`.
-void place_features(bool wide, double slack, const Bounds& other, Side& side) {
+void place_features(double slack, const Bounds& other, Side& side) {
   const double r = side.r;
   const int facets = side.capsule() ? 0 : static_cast<int>(side.surface->facets.size());
   const int bands = side.capsule() ? 1 : static_cast<int>(side.surface->edges.size());
   const int patches = static_cast<int>(side.vertices.size());
   side.facets.resize(facets), side.bands.resize(bands), side.patches.resize(patches);
   side.lines.resize(2 * bands), side.ends.resize(2 * bands), side.around.clear(), side.crossings.clear();
-  side.crossed.assign(side.features(), 0);
+  side.crossed.assign(side.features(), 0), side.refined.assign(side.features(), 0);
   const auto keep = [&](const Bounds& box, int feature) {
     const Bounds large = grown(box, slack);
     const bool kept = !apart(large, other);
@@ -1051,7 +1117,7 @@ void place_features(bool wide, double slack, const Bounds& other, Side& side) {
     const Vec3 normal = facet.plane.normal;
     facet.kept = keep({box.lower + r * normal, box.upper + r * normal}, f);
     if (!facet.kept) continue;
-    facet.plane.offset = wide ? wide_plane(side, f).offset.head : dot(normal, side.vertices[ring[0]]) + r;
+    facet.plane.offset = dot(normal, side.vertices[ring[0]]) + r;
     facet.nearest = facet.plane.offset * normal;
   }
   for (int e = 0; e < bands; ++e) {
@@ -1075,17 +1141,10 @@ void place_features(bool wide, double slack, const Bounds& other, Side& side) {
     }
     box = {box.lower + min(from, to), box.upper + max(from, to)};
     const bool kept = near && keep(grown(box, bulge), facets + e);
-    const double length = side.capsule() ? 2 * side.half_length : side.surface->edges[e].length;
     band.across = cross(band.along, band.middle);
-    if (wide) {
-      const WideVector begin = wide_corner(side, v), along = wide_along(side, e);
-      const DoubleDouble t = dot(begin, along);
-      band.begin = t.head, band.end = dot(wide_corner(side, w), along).head;
-      band.foot = side.rotation * rounded(begin - t * along);
-    } else {
-      band.begin = dot(from, band.along), band.end = band.begin + length;
-      band.foot = from - band.begin * band.along;
-    }
+    // From the nearer end.
+    band.begin = dot(from, band.along), band.end = dot(to, band.along);
+    band.foot = std::abs(band.begin) < std::abs(band.end) ? from - band.begin * band.along : to - band.end * band.along;
     // Patches beside the band are kept if a part of them is near.
     side.ends[2 * e] = {{band.along, band.begin}, 2 * bands + 2 * e};
     side.ends[2 * e + 1] = {{-band.along, -band.end}, 2 * bands + 2 * e + 1};
@@ -1097,16 +1156,14 @@ void place_features(bool wide, double slack, const Bounds& other, Side& side) {
       side.lines[2 * e + 1] = {{right, dot(right, band.foot)}, 2 * e + 1};
     }
     if (!kept) continue;
-    band.base = std::clamp(0.0, band.begin, band.end);
-    band.lever = std::sqrt(norm2(band.foot));
-    band.toward = band.lever > 0 ? -band.foot / band.lever : band.middle;
-    band.rise = wide ? wide_rise_of_band(side, e) : r - band.lever;
+    aim(band);
+    band.rise = r - band.lever;
   }
   for (int v = 0; v < patches; ++v) {
     if (!side.near[v]) continue;
     Patch& patch = side.patches[v];
     patch = {};
-    patch.centre = wide ? side.rotation * rounded(wide_corner(side, v)) : side.vertices[v];
+    patch.centre = side.vertices[v];
     Bounds box = kNothing;
     Vec3 pole{};
     double least = side.capsule() ? 0 : 1;
@@ -1131,8 +1188,7 @@ void place_features(bool wide, double slack, const Bounds& other, Side& side) {
     // The direction to the origin, unless a normal may be nearly opposite.
     constexpr double kFarOff = 0.5;
     if (dot(toward, pole) > kFarOff) {
-      patch.toward = toward, patch.lever = distance;
-      patch.rise = wide ? wide_rise_of_patch(side, v) : r - distance;
+      patch.toward = toward, patch.lever = distance, patch.rise = r - distance;
     } else {
       patch.toward = pole, patch.lever = -dot(patch.centre, pole), patch.rise = r - patch.lever;
       patch.aside = patch.centre + patch.lever * pole;
@@ -1178,7 +1234,7 @@ std::optional<VolumeAlone> volume_of_two_rounded(const Placed& a, const Placed& 
   for (const Vec3 v : sides[0].vertices) highest = std::max(highest, dot(way, v) + sides[0].r);
   for (const Vec3 v : sides[1].vertices) lowest = std::min(lowest, dot(way, v) - sides[1].r);
   keep_near(-way, -lowest + slack, sides[0]), keep_near(way, highest + slack, sides[1]);
-  for (const int i : {0, 1}) place_features(wide_too, slack, sides[1 - i].bounds, sides[i]);
+  for (const int i : {0, 1}) place_features(slack, sides[1 - i].bounds, sides[i]);
   TwoRounded both(*work, wide_too, tie, off, extent);
   if (!both.cross_all()) return std::nullopt;
   const auto holds = [&](int body, Vec3 point) {
