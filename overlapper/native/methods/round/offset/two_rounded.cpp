@@ -47,8 +47,9 @@ struct Band {
   Vec3 foot;  ///< of the origin on the axis
   Vec3 along, middle, across;
   double begin = 0, end = 0, half = 0;
-  double base = 0;  ///< m: integrals count t from here
-  Vec3 toward;      ///< w
+  double sine = 0, cosine = -1;  ///< of `half`
+  double base = 0;               ///< m: integrals count t from here
+  Vec3 toward;                   ///< w
   double rise = 0, lever = 0;
   double plain = 0, cap = 0;  ///< ∫∫ 1, 1 − w · u over φ and t
   Vec3 vector;                ///< m²: ∫ u over the area
@@ -204,8 +205,9 @@ struct Curve {
   double loss = 1;  ///< error of a point, relative to that of a place
 
   At operator()(double s) const {
-    if (kind == Kind::kLine) return {start + s * x, x};
-    const double sine = std::sin(s), cosine = std::cos(s);
+    return kind == Kind::kLine ? At{start + s * x, x} : (*this)(std::sin(s), std::cos(s));
+  }
+  At operator()(double sine, double cosine) const {
     if (kind == Kind::kConic) return {start + cosine * x + sine * y, cosine * y - sine * x};
     double half_sine = sine, half_cosine = cosine, turn = 2, half_rate = cosine, root, rate;
     if (closed) {
@@ -339,6 +341,20 @@ class TwoRounded {
     return beyond;
   }
 
+  /// True if all of a band is certainly beyond a border of a feature of the other body.
+  bool beyond(const Band& band, double r, const Side& other, int feature) const {
+    bool found = false;
+    for_borders(other, feature, [&](const Border& border, double sign) {
+      const Vec3 normal = sign * border.plane.normal;
+      const double m = dot(normal, band.middle), a = std::abs(dot(normal, band.across)), t = dot(normal, band.along);
+      const bool all = band.cosine < 0 || (m < 0 && a * band.cosine <= -m * band.sine);
+      const double least = all ? -std::sqrt(m * m + a * a) : m * band.cosine - a * band.sine;
+      const double height = dot(normal, band.foot) - sign * border.plane.offset + r * least;
+      found = found || height + std::min(t * band.begin, t * band.end) > tie_;
+    });
+    return found;
+  }
+
   /// Adds where the features of the two bodies cross. False if that is not certain.
   bool cross(const std::array<int, 2>& features) {
     const Side &a = work_.sides[0], &b = work_.sides[1];
@@ -348,6 +364,8 @@ class TwoRounded {
     if (facet_a) return cross_facet(0);
     if (facet_b) return cross_facet(1);
     const bool band_a = features[0] < a.first_patch(), band_b = features[1] < b.first_patch();
+    if (band_a && beyond(a.bands[features[0] - a.first_band()], a.r, b, features[1])) return true;
+    if (band_b && beyond(b.bands[features[1] - b.first_band()], b.r, a, features[0])) return true;
     if (band_a && band_b) return cross_bands();
     if (band_a) return cross_band_and_patch(0);
     if (band_b) return cross_band_and_patch(1);
@@ -587,12 +605,15 @@ class TwoRounded {
       for (int l = 0; l < count; ++l) {
         const Plane& plane = work_.limits[l].plane;
         const double c = signed_distance(plane, curve.start), a = dot(plane.normal, curve.x),
-                     b = dot(plane.normal, curve.y);
-        const double size = std::sqrt(a * a + b * b);
+                     b = dot(plane.normal, curve.y), size = std::sqrt(a * a + b * b);
         if (std::abs(std::abs(c) - size) < tie_) return false;
         if (c > size) return true;
-        if (c < -size) continue;
-        work_.doubtful.push_back(l);
+        if (c > -size) work_.doubtful.push_back(l);
+      }
+      for (const int l : work_.doubtful) {
+        const Plane& plane = work_.limits[l].plane;
+        const double c = signed_distance(plane, curve.start), a = dot(plane.normal, curve.x),
+                     b = dot(plane.normal, curve.y), size = std::sqrt(a * a + b * b);
         const double middle = std::atan2(b, a), off = std::acos(-c / size);
         for (const double root : {middle - off, middle + off})
           for (const double turn : {-2 * kPi, 0.0, 2 * kPi})
@@ -823,9 +844,12 @@ class TwoRounded {
     std::array<Terms, 2> sums{}, sizes{};
     std::array<std::array<slicing::Series, kTerms>, 2> series{};
     double length = 0, raised = 0, farthest = 0;
+    const double sine = std::sin(middle), cosine = std::cos(middle);
     for (const slicing::Node& node : rule) {
       const double step = half * (1 - 2 * node.fraction), weight = node.weight / node.sine;
-      const At below = curve(middle - step), above = curve(middle + step);
+      const double s = std::sin(step), c = std::cos(step);
+      const At below = curve(sine * c - cosine * s, cosine * c + sine * s);
+      const At above = curve(sine * c + cosine * s, cosine * c - sine * s);
       const double before = weight * std::sqrt(norm2(below.rate)), after = weight * std::sqrt(norm2(above.rate));
       length += before + after;
       farthest = std::max({farthest, norm2(below.point), norm2(above.point)});
@@ -1136,6 +1160,7 @@ void place_features(double slack, const Bounds& other, Side& side) {
     } else {
       const OffsetSurface::Edge& edge = side.surface->edges[e];
       band.along = side.rotation * edge.along, band.middle = side.rotation * edge.middle, band.half = edge.angle / 2;
+      band.sine = edge.chord / 2, band.cosine = std::sqrt(std::max(0.0, (1 - band.sine) * (1 + band.sine)));
       for (const int f : {edge.left, edge.right}) extend(box, r * side.facets[f].plane.normal);
       bulge = r * std::max(0.0, 1 - dot(side.facets[edge.left].plane.normal, band.middle));
     }
