@@ -57,7 +57,8 @@ struct Band {
 /// Points of the patch are centre + r u. With a direction w, x · u is rise + lever (1 − w · u) + aside · u.
 struct Patch {
   Vec3 centre;
-  Vec3 toward;  ///< w, not opposite to a normal
+  Vec3 toward;             ///< w, not opposite to a normal
+  bool to_origin = false;  ///< w leads from the centre to the origin
   double rise = 0, lever = 0;
   Vec3 aside;
   double angle = 0, cap = 0;  ///< ∫ 1, 1 − w · u over the solid angle
@@ -163,7 +164,7 @@ void refine(int feature, Side& side) {
   } else {
     const int v = feature - side.first_patch();
     Patch& patch = side.patches[v];
-    if (patch.aside == Vec3{}) patch.rise = (DoubleDouble{side.r} - norm(wide_corner(side, v))).head;
+    if (patch.to_origin) patch.rise = (DoubleDouble{side.r} - norm(wide_corner(side, v))).head;
   }
 }
 
@@ -964,6 +965,13 @@ class TwoRounded {
         known = distance < 0;
       }
     }
+    // Near the origin, closed forms of whole bands and patches are differences that lose digits. Their borders do not.
+    if (wide_)
+      for (const Around& around : side.around) {
+        const int f = around.feature;
+        if (f < side.first_band() || side.crossed[f] || !holds_whole(side, f)) continue;
+        refine(f, side), side.crossed[f] = 1;
+      }
     // The parts of elements in the other body.
     next = 0;
     for (const int element : near) {
@@ -1013,11 +1021,26 @@ class TwoRounded {
     return integrate(arc, from, to, std::span(targets).first(count), 0);
   }
 
+  /// True if the other body holds a feature that it does not cross.
+  static bool holds_whole(Side& side, int feature) {
+    const int ends = 2 * static_cast<int>(side.bands.size()), v = feature - side.first_patch();
+    int node;
+    if (feature < side.first_band()) {
+      node = side.hull->ring_start[feature];
+    } else if (v < 0) {
+      node = side.ends_of(ends + 2 * (feature - side.first_band())).first;
+    } else if (side.capsule()) {
+      node = v;
+    } else {
+      const int e = side.surface->edges_at(v)[0];
+      node = side.ends_of(ends + 2 * e + (side.surface->edges[e].from == v ? 0 : 1)).first;
+    }
+    return side.inside[find(side.root, node)] == 1;
+  }
+
   /// Adds the parts of all features in the other body.
   void add_features(int body) {
     Side& side = work_.sides[body];
-    const int bands = static_cast<int>(side.bands.size());
-    const auto holds = [&](int node) { return side.inside[find(side.root, node)] == 1; };
     const auto finish = [&](int feature, const Terms& term, double area) {
       const auto [value, size] = cone({body, feature, 1}, term);
       thrice_ += value, size_ += size, area_ += std::abs(area), unbalanced_ += Vec3{term[2], term[3], term[4]};
@@ -1025,10 +1048,10 @@ class TwoRounded {
     for (const Around& around : side.around) {
       const int f = around.feature;
       const bool crossed = side.crossed[f];
+      if (!crossed && !holds_whole(side, f)) continue;
       if (f < side.first_band()) {
         MovedFacet& facet = side.facets[f];
         if (!crossed) {
-          if (!holds(side.hull->ring_start[f])) continue;
           if (wide_) refine(f, side);
           facet.twice_area = 2 * side.surface->facets[f].area;
         }
@@ -1039,11 +1062,10 @@ class TwoRounded {
         const int e = f - side.first_band();
         Band& band = side.bands[e];
         if (!crossed) {
-          if (!holds(side.ends_of(2 * bands + 2 * e).first)) continue;
-          if (wide_) refine(f, side);
           const double length = band.end - band.begin, chord = side.capsule() ? 0 : side.surface->edges[e].chord;
           band.plain = 2 * band.half * length, band.vector = side.r * chord * length * band.middle;
           band.cap = band.plain - dot(band.toward, band.vector) / side.r;
+          size_ += side.r * std::abs(band.lever) * band.plain;
         }
         finish(f, {band.plain, band.cap, band.vector.x, band.vector.y, band.vector.z}, side.r * band.plain);
       } else {
@@ -1051,19 +1073,15 @@ class TwoRounded {
         Patch& patch = side.patches[v];
         const double square = side.r * side.r;
         if (!crossed) {
-          int element = 2 * bands + v;
-          if (!side.capsule()) {
-            const int e = side.surface->edges_at(v)[0];
-            element = 2 * bands + 2 * e + (side.surface->edges[e].from == v ? 0 : 1);
-          }
-          if (!holds(side.ends_of(element).first)) continue;
-          if (wide_) refine(f, side);
           const Vec3 normals = side.capsule() ? Vec3{0, 0, v == 0 ? -kPi : kPi} : side.surface->vertices[v].normals;
           patch.angle = side.capsule() ? 2 * kPi : side.surface->vertices[v].solid_angle;
           patch.vector = square * (side.rotation * normals);
           patch.cap = patch.angle - dot(patch.toward, patch.vector) / square;
+          // The solid angle is a difference of angles, too.
+          size_ += square * (std::abs(patch.rise) + std::abs(patch.lever)) * (1 + patch.angle);
         }
         finish(f, {patch.angle, patch.cap, patch.vector.x, patch.vector.y, patch.vector.z}, square * patch.angle);
+        if (!patch.to_origin) raised_ += square * std::abs(patch.angle);
       }
     }
   }
@@ -1213,7 +1231,7 @@ void place_features(double slack, const Bounds& other, Side& side) {
     // The direction to the origin, unless a normal may be nearly opposite.
     constexpr double kFarOff = 0.5;
     if (dot(toward, pole) > kFarOff) {
-      patch.toward = toward, patch.lever = distance, patch.rise = r - distance;
+      patch.to_origin = true, patch.toward = toward, patch.lever = distance, patch.rise = r - distance;
     } else {
       patch.toward = pole, patch.lever = -dot(patch.centre, pole), patch.rise = r - patch.lever;
       patch.aside = patch.centre + patch.lever * pole;
