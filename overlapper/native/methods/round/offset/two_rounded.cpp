@@ -270,6 +270,7 @@ class TwoRounded {
   }
 
   double volume() const { return thrice_ / 3; }
+  bool crossed() const { return crossed_; }
   double error() const {
     const double reach = std::min(extent_, reach_), off_place = kOfPlaces * (largest_ + reach);
     // Rounding of places leaves area vectors that do not add up to zero, but that is not an error of the volume.
@@ -734,6 +735,7 @@ class TwoRounded {
       for (const int i : {0, 1}) height = std::max(height, terms({i, features_[i], 1}, end, unused));
       work_.sides[limit->body].crossings.push_back({limit->element, at, slope > 0, end.point, height});
     }
+    crossed_ = true;
     const double side = forwards > 0 ? 1 : -1;
     std::array<Target, 2> targets;
     for (const int i : {0, 1}) {
@@ -798,7 +800,6 @@ class TwoRounded {
     Side& side = work_.sides[target.body];
     const int feature = target.feature;
     const double sign = target.sign;
-    size_ += cone(target, term).second;
     if (feature < side.first_band()) {
       side.facets[feature].twice_area += sign * term[0];
     } else if (feature < side.first_patch()) {
@@ -819,6 +820,7 @@ class TwoRounded {
         Terms term;
         raised_ += curve.loss * (high - low) * terms(target, whole, term);
         put(target, term);
+        size_ += cone(target, term).second;
       }
       border_ += curve.loss * (high - low);
       for (const double s : {low, high}) reach_ = std::max(reach_, std::sqrt(norm2(curve(s).point)));
@@ -883,6 +885,10 @@ class TwoRounded {
     for (size_t i = 0; i < targets.size(); ++i) {
       for (double& sum : sums[i]) sum *= scale;
       put(targets[i], sums[i]);
+      // A direction from an axis or a centre loses what places lose, relative to the radius.
+      const Side& side = work_.sides[targets[i].body];
+      const double lost = targets[i].feature < side.first_band() ? 0 : kOfPlaces * std::sqrt(farthest) / side.r;
+      size_ += scale * cone(targets[i], sizes[i]).second * (1 + lost / kOfTermsOfTwo);
     }
     return true;
   }
@@ -1004,7 +1010,10 @@ class TwoRounded {
       // The facet's normal is more exact than the point at the end of the band.
       const Vec3 start = band.foot + side.r * facet.plane.normal - facet.nearest;
       const Vec3 swept = overlapper::cross(start, (to - from) * band.along);
-      put({body, f, first ? 1.0 : -1.0}, {dot(facet.plane.normal, swept), 0, 0, 0, 0});
+      const Target target{body, f, first ? 1.0 : -1.0};
+      const Terms term{dot(facet.plane.normal, swept), 0, 0, 0, 0};
+      put(target, term);
+      size_ += cone(target, term).second;
       return true;
     }
     const auto [at_begin, at_end] = ends_of_band(side, e);
@@ -1095,6 +1104,7 @@ class TwoRounded {
   double largest_ = std::max(work_.sides[0].r, work_.sides[1].r);
   std::array<int, 2> features_{};
   bool failed_ = false;
+  bool crossed_ = false;  ///< the surfaces cross
   double thrice_ = 0, size_ = 0, area_ = 0;
   double open_ = 0;    ///< m²: sum of the gaps where crossings go on, by |x · u|
   double border_ = 0;  ///< m: length of all crossings, by their loss
@@ -1280,6 +1290,16 @@ std::optional<VolumeAlone> volume_of_two_rounded(const Placed& a, const Placed& 
   for (const int i : {0, 1}) place_features(slack, sides[1 - i].bounds, sides[i]);
   TwoRounded both(*work, wide_too, tie, off, extent);
   if (!both.cross_all()) return std::nullopt;
+  if (!both.crossed()) {
+    // One body holds the other one.
+    for (const int i : {0, 1}) {
+      const Vec3 point = bodies[i]->support({1, 0, 0});
+      const double whole = volume(bodies[i]->shape);
+      if (signed_distance(bodies[1 - i]->tightest(point), point) < -slack)
+        return VolumeAlone{whole, kOfTermsOfTwo * whole};
+    }
+    return std::nullopt;
+  }
   const auto holds = [&](int body, Vec3 point) {
     const Vec3 placed = point + origin;
     return signed_distance(bodies[body]->tightest(placed), placed);
