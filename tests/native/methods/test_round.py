@@ -268,10 +268,10 @@ def test_a_cap_however_small_is_subtracted(tilt, other):
         ),
     ],
 )
-def test_rounded_tetrahedra_deep_in_each_other_are_sliced(position, orientation, other_orientation):
+def test_rounded_tetrahedra_deep_in_each_other_share_what_is_proved(position, orientation, other_orientation):
     rounded = RoundedHull(0.3 * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]), 0.2)
     answer = overlap(Placed(rounded, position, orientation), Placed(rounded, (0, 0, 0), other_orientation))
-    assert answer.way == "slicing"
+    assert answer.way in ("closed form", "slicing")
     lower, upper = answer.certificate().verify()
     assert float(lower) == pytest.approx(answer.volume, rel=1e-13) == float(upper)
     assert answer.volume_error < 1e-11 * answer.volume
@@ -464,7 +464,7 @@ def test_meshes_that_meet_within_their_margins_are_measured_to_eleven_digits():
     for _ in range(10):
         one, other = (Placed(RoundedHull(rng.normal(size=(30, 3)) * 0.05, 1e-3), (x, 0, 0)) for x in (0, 0.5))
         found = overlap(*sink(one, other, 2e-4))
-        assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume
+        assert found.way in ("closed form", "slicing") and found.volume_error <= 1e-11 * found.volume
 
 
 @pytest.mark.parametrize("first_seed", range(0, 200, 100))
@@ -529,14 +529,14 @@ def assert_motion_changes_nothing(a, b, rng):
 
 
 @pytest.mark.parametrize(("points", "margin"), [(250, 0.05), (500, 0.05), (500, 0)])
-def test_meshes_of_many_facets_deep_in_each_other_are_sliced(points, margin):
+def test_meshes_of_many_facets_deep_in_each_other_are_measured_of_their_round_shapes(points, margin):
     """The hulls have more walls than a slice has lines. Pieces have few walls and lie far from the deepest point."""
     clouds = [np.random.default_rng(seed).normal(size=(points, 3)) for seed in (0, 1)]
     one, other = (cloud / np.linalg.norm(cloud, axis=1)[:, None] for cloud in clouds)
     second = RoundedHull(other, margin) if margin else Hull(other)
     pair = Placed(RoundedHull(one, 0.05)), Placed(second, (0.3, 0.2, 0.4), (0.1, 0.2, 0.3, 0.9))
     found = assert_motion_changes_nothing(*pair, np.random.default_rng(0))
-    assert found.way == "slicing" and found.volume_error <= 1e-10 * found.volume
+    assert found.way in ("closed form", "slicing") and found.volume_error <= 1e-10 * found.volume
 
 
 @pytest.mark.parametrize("first_seed", range(0, 60, 20))
@@ -573,17 +573,17 @@ def test_shallow_contacts_of_rounded_hulls_are_measured_to_eleven_digits(seed):
     points *= rng.uniform(0.3, 0.6, 3) / np.linalg.norm(points, axis=1)[:, None]
     hull = Placed(RoundedHull(points, rng.uniform(0.02, 0.1)), 0.4 * rng.normal(size=3), quaternion(rng))
     found = overlap(*sink(hull, Placed(Capsule(0.3, 0.7), (0, 0, 0), quaternion(rng)), 10.0 ** -rng.uniform(4, 6)))
-    assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume
+    assert found.way in ("closed form", "slicing") and found.volume_error <= 1e-11 * found.volume
 
 
-def test_rounded_boxes_that_are_nearly_parallel_are_sliced():
+def test_rounded_boxes_that_are_nearly_parallel_are_measured_of_their_round_shapes():
     """Slices of two cylinders may not be turned: planes nearly parallel to them rush across, in a billionth of all."""
     found = []
     for seed in range(200):
         found.append(assert_motion_changes_nothing(*make("tilted_round", seed).bodies, np.random.default_rng(seed)))
     overlapping = [one for one in found if one]
     assert len(overlapping) > 180
-    assert {one.way for one in overlapping} == {"slicing"}
+    assert {one.way for one in overlapping} <= {"closed form", "slicing"}
     assert sum(one.volume_error > 1e-11 * one.volume for one in overlapping) <= 0.2 * len(overlapping)
 
 
@@ -748,8 +748,8 @@ def test_meshes_with_margins_deep_in_each_other_are_measured_of_their_round_shap
     a = Placed(first, rng.normal(size=3) * 0.1, rng.normal(size=4))
     b = Placed(meshes[1], rng.normal(size=3) * 0.3, rng.normal(size=4))
     found = overlap(a, b)
-    way = "closed form" if isinstance(first, Sphere) else "slicing"
-    assert not found or (found.way == way and found.volume_error <= 1e-11 * found.volume)
+    ways = ("closed form",) if isinstance(first, Sphere) else ("closed form", "slicing")
+    assert not found or (found.way in ways and found.volume_error <= 1e-11 * found.volume)
 
 
 def test_a_wedge_shorter_than_its_radius_by_millions_is_not_lost():
