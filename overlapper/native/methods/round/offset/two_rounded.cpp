@@ -343,16 +343,25 @@ class TwoRounded {
     return beyond;
   }
 
-  /// True if all of a band is certainly beyond a border of a feature of the other body.
-  bool beyond(const Band& band, double r, const Side& other, int feature) const {
+  /// True if all of a band or a sphere is certainly beyond a border of a feature of the other body.
+  bool beyond(const Side& side, int round, const Side& other, int feature) const {
+    const bool is_band = round < side.first_patch();
+    const Band* band = is_band ? &side.bands[round - side.first_band()] : nullptr;
+    const Vec3 from = is_band ? band->foot : side.patches[round - side.first_patch()].centre;
     bool found = false;
     for_borders(other, feature, [&](const Border& border, double sign) {
       const Vec3 normal = sign * border.plane.normal;
-      const double m = dot(normal, band.middle), a = std::abs(dot(normal, band.across)), t = dot(normal, band.along);
-      const bool all = band.cosine < 0 || (m < 0 && a * band.cosine <= -m * band.sine);
-      const double least = all ? -std::sqrt(m * m + a * a) : m * band.cosine - a * band.sine;
-      const double height = dot(normal, band.foot) - sign * border.plane.offset + r * least;
-      found = found || height + std::min(t * band.begin, t * band.end) > tie_;
+      double height = dot(normal, from) - sign * border.plane.offset;
+      if (is_band) {
+        const double m = dot(normal, band->middle), a = std::abs(dot(normal, band->across)),
+                     t = dot(normal, band->along);
+        const bool all = band->cosine < 0 || (m < 0 && a * band->cosine <= -m * band->sine);
+        const double least = all ? -std::sqrt(m * m + a * a) : m * band->cosine - a * band->sine;
+        height += side.r * least + std::min(t * band->begin, t * band->end);
+      } else {
+        height -= side.r;
+      }
+      found = found || height > tie_;
     });
     return found;
   }
@@ -363,11 +372,11 @@ class TwoRounded {
     features_ = features;
     const bool facet_a = features[0] < a.first_band(), facet_b = features[1] < b.first_band();
     if (facet_a && facet_b) return cross_facets();
+    if (!facet_a && beyond(a, features[0], b, features[1])) return true;
+    if (!facet_b && beyond(b, features[1], a, features[0])) return true;
     if (facet_a) return cross_facet(0);
     if (facet_b) return cross_facet(1);
     const bool band_a = features[0] < a.first_patch(), band_b = features[1] < b.first_patch();
-    if (band_a && beyond(a.bands[features[0] - a.first_band()], a.r, b, features[1])) return true;
-    if (band_b && beyond(b.bands[features[1] - b.first_band()], b.r, a, features[0])) return true;
     if (band_a && band_b) return cross_bands();
     if (band_a) return cross_band_and_patch(0);
     if (band_b) return cross_band_and_patch(1);
@@ -649,16 +658,29 @@ class TwoRounded {
     constexpr int kMost = 16;
     std::array<At, kMost + 1> samples;
     const int parts = high - low > 1 ? kMost : kMost / 2;
-    const double step = (high - low) / parts;
-    for (int i = 0; i <= parts; ++i) samples[i] = curve(i == parts ? high : low + i * step);
+    const double step = (high - low) / parts, sine = std::sin(step), cosine = std::cos(step);
+    double s = std::sin(low), c = std::cos(low);
+    for (int i = 0; i <= parts; ++i) {
+      samples[i] = curve(s, c);
+      const double next = s * cosine + c * sine;
+      c = c * cosine - s * sine, s = next;
+    }
+    const auto place = [&](int i) { return i == parts ? high : low + i * step; };
     for (int l = 0; l < static_cast<int>(work_.limits.size()); ++l) {
       const Plane& plane = work_.limits[l].plane;
       const size_t before = work_.roots.size();
-      for (int i = 0; i < parts; ++i)
-        find_root(curve, plane, l, low + i * step, samples[i], i + 1 == parts ? high : low + (i + 1) * step,
-                  samples[i + 1], 0);
+      double height = signed_distance(plane, samples[0].point), rise = dot(plane.normal, samples[0].rate);
+      for (int i = 0; i < parts; ++i) {
+        const double next = signed_distance(plane, samples[i + 1].point),
+                     next_rise = dot(plane.normal, samples[i + 1].rate);
+        // Between heights of the same side there is no root, unless they turn.
+        const bool steady = height > 0 ? next > 0 && !(rise < 0 && next_rise > 0)
+                                       : height < 0 && next < 0 && !(rise > 0 && next_rise < 0);
+        if (!steady) find_root(curve, plane, l, place(i), samples[i], place(i + 1), samples[i + 1], 0);
+        height = next, rise = next_rise;
+      }
       if (work_.roots.size() > before) work_.doubtful.push_back(l);
-      else if (signed_distance(plane, samples[parts / 2].point) > 0) return false;
+      else if (height > 0) return false;
     }
     return true;
   }
