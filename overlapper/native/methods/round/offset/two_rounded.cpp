@@ -1296,40 +1296,43 @@ std::optional<VolumeAlone> volume_of_two_rounded(const Placed& a, const Placed& 
                                                    wide_difference(a.position, b.position)) -
       wide(data_origin(b.shape));
   start(a, wide(inner), sides[0]), start(b, in_other, sides[1]);
-  const double rounded_off = rounding(reach(a, reach(b, size)));
-  const bool wide_too = between.has_value();
-  const double off = wide_too ? wide_placing(reach(a, reach(b, size)), true) : rounded_off;
+  const double magnitude = reach(a, reach(b, size)), rounded_off = rounding(magnitude), slack = 4 * rounded_off;
   const Bounds common{max(sides[0].bounds.lower, sides[1].bounds.lower),
                       min(sides[0].bounds.upper, sides[1].bounds.upper)};
-  const double extent = norm(common.upper - common.lower), slack = 4 * rounded_off;
-  const double tie = wide_too ? 16 * kUnit * (sides[0].r + sides[1].r + extent) : slack;
+  const double extent = norm(common.upper - common.lower);
   // No point of a body is beyond its own plane across this direction.
   const Vec3 way = between ? a.tightest(origin).normal : unit(b.pose.translation - a.pose.translation);
   double highest = -kInfinity, lowest = kInfinity;
   for (const Vec3 v : sides[0].vertices) highest = std::max(highest, dot(way, v) + sides[0].r);
   for (const Vec3 v : sides[1].vertices) lowest = std::min(lowest, dot(way, v) - sides[1].r);
   keep_near(-way, -lowest + slack, sides[0]), keep_near(way, highest + slack, sides[1]);
-  for (const int i : {0, 1}) place_features(slack, sides[1 - i].bounds, sides[i]);
-  TwoRounded both(*work, wide_too, tie, off, extent);
-  if (!both.cross_all()) return std::nullopt;
-  if (!both.crossed()) {
+  const auto distance = [&](int body, Vec3 point) { return signed_distance(bodies[body]->tightest(point), point); };
+  const auto measured = [&](bool wide_too) -> std::optional<VolumeAlone> {
+    const double off = wide_too ? wide_placing(magnitude, true) : rounded_off;
+    const double tie = wide_too ? 16 * kUnit * (sides[0].r + sides[1].r + extent) : slack;
+    for (const int i : {0, 1}) place_features(slack, sides[1 - i].bounds, sides[i]);
+    TwoRounded both(*work, wide_too, tie, off, extent);
+    if (!both.cross_all()) return std::nullopt;
+    if (both.crossed()) {
+      if (!both.add_all([&](int body, Vec3 point) { return distance(body, point + origin); })) return std::nullopt;
+      return VolumeAlone{both.volume(), both.error()};
+    }
     // One body holds the other one.
     for (const int i : {0, 1}) {
-      const Vec3 point = bodies[i]->support({1, 0, 0});
       const double whole = volume(bodies[i]->shape);
-      if (signed_distance(bodies[1 - i]->tightest(point), point) < -slack)
-        return VolumeAlone{whole, kOfTermsOfTwo * whole};
+      if (distance(1 - i, bodies[i]->support({1, 0, 0})) < -slack) return VolumeAlone{whole, kOfTermsOfTwo * whole};
     }
     return std::nullopt;
-  }
-  const auto holds = [&](int body, Vec3 point) {
-    const Vec3 placed = point + origin;
-    return signed_distance(bodies[body]->tightest(placed), placed);
   };
-  if (!both.add_all(holds)) return std::nullopt;
-  const VolumeAlone found{both.volume(), both.error()};
-  if (!(found.volume > 0 && found.error <= kEnough * found.volume)) return std::nullopt;
-  return found;
+  const auto enough = [](const VolumeAlone& found) {
+    return found.volume > 0 && found.error <= kEnough * found.volume;
+  };
+  // The volume is at most half the area times the distance of both planes. The error is at least the area times what
+  // doubles lose.
+  const bool shallow = between || 2 * rounded_off > kEnough * (highest - lowest);
+  std::optional<VolumeAlone> found = measured(shallow);
+  if (found && !enough(*found) && !shallow) found = measured(true);
+  return found && enough(*found) ? found : std::nullopt;
 }
 
 }  // namespace overlapper::offset
