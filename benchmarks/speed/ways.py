@@ -82,7 +82,7 @@ TYPICAL = {
     "two cylinders": typical("slicing", (CAN,), (CAN, (0.3, 0.2, 0.1), TURN)),
     "a ball on the side of a capsule": typical("slicing", (BALL,), (CAPSULE, (0.6, 0, 0.1), TURN)),
     "two meshes of 20 facets with margins, 1 mm each": typical(
-        "slicing", (WITH_MARGIN,), (WITH_MARGIN, (0.12, 0.07, 0.09), TURN)
+        "closed form", (WITH_MARGIN,), (WITH_MARGIN, (0.12, 0.07, 0.09), TURN)
     ),
     "a rounded hull of 80 facets and a box": typical(
         "closed form", (RoundedHull(icosphere(1), 0.05),), (CUBE, (0.9, 0.3, 0.4), TURN)

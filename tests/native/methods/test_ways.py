@@ -120,10 +120,10 @@ WITH_A_ROUNDED_HULL = {
     "box": (Box([0.5, 0.5, 0.5]), "closed form"),
     "hull": (Hull([[-1, -1, -1], [1, -1, -1], [0, 1, -1], [0, 0, 1]]), "closed form"),
     "ball": (Sphere(0.5), "closed form"),
-    "capsule": (Capsule(0.3, 1.0), "slicing"),
+    "capsule": (Capsule(0.3, 1.0), "closed form"),
     "cylinder": (Cylinder(0.3, 1.0), "slicing"),
     "ellipsoid": (Ellipsoid([0.3, 0.4, 0.5]), "slicing"),
-    "rounded hull": (RoundedHull([[-1, -1, -1], [1, -1, -1], [0, 1, -1], [0, 0, 1]], 0.1), "slicing"),
+    "rounded hull": (RoundedHull([[-1, -1, -1], [1, -1, -1], [0, 1, -1], [0, 0, 1]], 0.1), "closed form"),
 }
 
 

@@ -12,8 +12,7 @@ namespace overlapper::offset {
 /// line, an ellipse, a circle or a quartic. Where a crossing leaves a feature, it goes on in the feature beside it. The
 /// flux of x / 3 through the part of a feature in the other body is an integral along the border of this part (Stokes).
 ///
-/// In a shallow contact, depths come from double-doubles. `between` is a point inside both bodies, if their cores are
-/// apart.
+/// In a shallow contact, depths come from double-doubles. `between` is a point inside both bodies, if one is known.
 ///
 /// No value if facets are not exact, if features touch up to rounding, or if the error is more than kEnough of the
 /// volume.
