@@ -1165,8 +1165,8 @@ void keep_near(Vec3 normal, double most, Side& side) {
   for (size_t v = 0; v < side.vertices.size(); ++v) side.near[v] = dot(normal, side.vertices[v]) - side.r <= most;
 }
 
-/// Places the features that may reach the box `other`.
-void place_features(double slack, const Bounds& other, Side& side) {
+/// Places the features that may reach the box `other`. False if the normals of a vertex are spread too far.
+bool place_features(double slack, const Bounds& other, Side& side) {
   const double r = side.r;
   const int facets = side.capsule() ? 0 : static_cast<int>(side.surface->facets.size());
   const int bands = side.capsule() ? 1 : static_cast<int>(side.surface->edges.size());
@@ -1260,9 +1260,10 @@ void place_features(double slack, const Bounds& other, Side& side) {
     if (!keep(grown(box, large ? r : r * std::max(0.0, 1 - least)), facets + bands + v)) continue;
     const double distance = std::sqrt(norm2(patch.centre));
     const Vec3 toward = distance > 0 ? -patch.centre / distance : pole;
-    // The direction to the origin, unless a normal may be nearly opposite.
-    constexpr double kFarOff = 0.5;
-    if (dot(toward, pole) > kFarOff) {
+    // No integral about a direction is certain if a normal is nearly opposite to it.
+    constexpr double kOppositeToPole = -0.9, kFarOff = 0.5, kSpread = -0.3;
+    if (least < kOppositeToPole) return false;
+    if (dot(toward, pole) > kFarOff && least > kSpread) {
       patch.to_origin = true, patch.toward = toward, patch.lever = distance, patch.rise = r - distance;
     } else {
       patch.toward = pole, patch.lever = -dot(patch.centre, pole), patch.rise = r - patch.lever;
@@ -1270,6 +1271,7 @@ void place_features(double slack, const Bounds& other, Side& side) {
     }
   }
   std::ranges::sort(side.around, {}, [](const Around& around) { return around.box.lower.x; });
+  return true;
 }
 
 }  // namespace
@@ -1310,7 +1312,8 @@ std::optional<VolumeAlone> volume_of_two_rounded(const Placed& a, const Placed& 
   const auto measured = [&](bool wide_too) -> std::optional<VolumeAlone> {
     const double off = wide_too ? wide_placing(magnitude, true) : rounded_off;
     const double tie = wide_too ? 16 * kUnit * (sides[0].r + sides[1].r + extent) : slack;
-    for (const int i : {0, 1}) place_features(slack, sides[1 - i].bounds, sides[i]);
+    for (const int i : {0, 1})
+      if (!place_features(slack, sides[1 - i].bounds, sides[i])) return std::nullopt;
     TwoRounded both(*work, wide_too, tie, off, extent);
     if (!both.cross_all()) return std::nullopt;
     if (both.crossed()) {
