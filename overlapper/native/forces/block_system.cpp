@@ -17,30 +17,49 @@ void subtract_product(double* c, const double* a, const double* b, int r, int m,
     }
 }
 
-/// Inverts a matrix in place by Gauss and Jordan's method with row exchanges. Unknowns without an equation stay 0.
-void invert(double* m, int n) {
-  std::vector<int> from(n);
+/// Replaces a matrix by its triangles L and U, with row exchanges: `from` has the row that each row is exchanged with.
+/// The diagonal is that of U, inverted. An unknown without an equation has 0 there, and stays 0.
+void factorise(double* m, int n, int* from) {
   for (int k = 0; k < n; ++k) {
     int best = k;
     for (int i = k + 1; i < n; ++i)
       if (std::abs(m[i * n + k]) > std::abs(m[best * n + k])) best = i;
     from[k] = best;
     if (best != k) std::swap_ranges(m + k * n, m + (k + 1) * n, m + best * n);
-    const double pivot = m[k * n + k];
-    const double scale = pivot != 0 ? 1 / pivot : 0;
-    m[k * n + k] = 1;
-    for (int j = 0; j < n; ++j) m[k * n + j] *= scale;
-    for (int i = 0; i < n; ++i) {
-      if (i == k) continue;
-      const double factor = m[i * n + k];
-      if (factor == 0) continue;
-      m[i * n + k] = 0;
-      for (int j = 0; j < n; ++j) m[i * n + j] -= factor * m[k * n + j];
+    const double* row = m + k * n;
+    const double scale = m[k * n + k] = row[k] != 0 ? 1 / row[k] : 0;
+    for (int i = k + 1; i < n; ++i) {
+      double* to = m + i * n;
+      if (to[k] == 0) continue;
+      const double factor = to[k] *= scale;
+      for (int j = k + 1; j < n; ++j) to[j] -= factor * row[j];
     }
   }
-  for (int k = n - 1; k >= 0; --k)
-    if (from[k] != k)
-      for (int i = 0; i < n; ++i) std::swap(m[i * n + k], m[i * n + from[k]]);
+}
+
+/// Replaces r rows x by x A⁻¹, where A was factorised.
+void divide(double* x, int r, const double* m, int n, const int* from) {
+  for (int i = 0; i < r; ++i, x += n) {
+    for (int k = 0; k < n; ++k) {
+      const double factor = x[k] *= m[k * n + k];
+      for (int j = k + 1; j < n; ++j) x[j] -= factor * m[k * n + j];
+    }
+    for (int k = n - 1; k > 0; --k)
+      for (int j = 0; j < k; ++j) x[j] -= x[k] * m[k * n + j];
+    for (int k = n - 1; k >= 0; --k) std::swap(x[k], x[from[k]]);
+  }
+}
+
+/// Replaces a column x by A⁻¹ x, where A was factorised.
+void solve_for(double* x, const double* m, int n, const int* from) {
+  for (int k = 0; k < n; ++k) {
+    std::swap(x[k], x[from[k]]);
+    for (int j = 0; j < k; ++j) x[k] -= m[k * n + j] * x[j];
+  }
+  for (int k = n - 1; k >= 0; --k) {
+    for (int j = k + 1; j < n; ++j) x[k] -= m[k * n + j] * x[j];
+    x[k] *= m[k * n + k];
+  }
 }
 
 }  // namespace
@@ -116,24 +135,23 @@ size_t BlockSystem::offset(int row, int column) const {
 double* BlockSystem::at(int row, int column) { return &numbers_[offset(row, column)]; }
 
 void BlockSystem::solve(std::span<double> right) {
-  std::vector<double> factor;
+  std::vector<int> exchanged(right.size());
   for (int k : order_) {
     const int n = sizes_[k];
-    double* inverse = &numbers_[diagonal_[k]];
-    invert(inverse, n);
+    const double* own = &numbers_[diagonal_[k]];
+    int* from = &exchanged[first_[k]];
+    factorise(&numbers_[diagonal_[k]], n, from);
     for (size_t i = 0; i < later_[k].size(); ++i) {
       const int row = later_[k][i], m = sizes_[row];
-      factor.assign(size_t(m) * n, 0.0);
-      subtract_product(factor.data(), &numbers_[below_[k][i]], inverse, m, n, n);
-      for (double& each : factor) each = -each;
+      double* factor = &numbers_[below_[k][i]];
+      divide(factor, m, own, n, from);
       for (size_t j = 0; j < later_[k].size(); ++j) {
         const int column = later_[k][j];
-        subtract_product(at(row, column), factor.data(), &numbers_[right_[k][j]], m, n, sizes_[column]);
+        subtract_product(at(row, column), factor, &numbers_[right_[k][j]], m, n, sizes_[column]);
       }
-      subtract_product(&right[first_[row]], factor.data(), &right[first_[k]], m, n, 1);
+      subtract_product(&right[first_[row]], factor, &right[first_[k]], m, n, 1);
     }
   }
-  std::vector<double> own;
   for (auto k = order_.rbegin(); k != order_.rend(); ++k) {
     const int n = sizes_[*k];
     double* to = &right[first_[*k]];
@@ -141,10 +159,7 @@ void BlockSystem::solve(std::span<double> right) {
       const int column = later_[*k][j];
       subtract_product(to, &numbers_[right_[*k][j]], &right[first_[column]], n, sizes_[column], 1);
     }
-    own.assign(to, to + n);
-    std::fill_n(to, n, 0.0);
-    subtract_product(to, &numbers_[diagonal_[*k]], own.data(), n, n, 1);
-    for (int i = 0; i < n; ++i) to[i] = -to[i];
+    solve_for(to, &numbers_[diagonal_[*k]], n, &exchanged[first_[*k]]);
   }
 }
 

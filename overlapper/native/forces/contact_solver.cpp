@@ -540,6 +540,7 @@ class ContactSolver::Newton {
         afresh_(system_.unknowns() <= kFewCoordinates),
         patches_(island.rows.size()) {
     moved_.resize(solver.bodies_.coordinates());
+    find_parts();
   }
 
   /// Finds wrenches and velocities that agree, such that the wrenches change slips by `enough` at most.
@@ -593,6 +594,13 @@ class ContactSolver::Newton {
   static double& at(Six& of, int k) { return k < 3 ? of.normal[k] : of.tangential[k - 3]; }
   static double at(const Six& of, int k) { return k < 3 ? of.normal[k] : of.tangential[k - 3]; }
 
+  /// A side of a patch that moves: its block, the slip by each of its coordinates (6 rows), and the change of each
+  /// coordinate by a wrench in 1 s (rows of 6).
+  struct Part {
+    int block = -1, coordinates = 0;
+    const double *rows = nullptr, *answers = nullptr;
+  };
+
   /// A patch in a step: slip and relative damping, the wrench by its laws, what is missing to it, and the changes.
   struct OfPatch {
     Six begin;  ///< the wrench at first, and its pressures
@@ -604,6 +612,7 @@ class ContactSolver::Newton {
     SixNumbers by_damping{};
     Six slip_change, change;
     double more_change = 0;
+    std::array<Part, 2> parts{};
   };
 
   static std::vector<int> sizes(const ContactSolver& solver, const Island& island) {
@@ -624,29 +633,38 @@ class ContactSolver::Newton {
     return int(std::ranges::lower_bound(island.bodies, side.body) - island.bodies.begin());
   }
 
-  /// The slip by each coordinate of a side: 6 rows.
-  void rows_of(const Row& row, const Side& side, std::vector<double>& rows) const {
-    const size_t n = side.coordinates;
-    if (!side.single) {
-      rows.assign(&solver_.pool_[side.rows], &solver_.pool_[side.rows] + 6 * n);
-      return;
+  void find_parts() {
+    size_t singles = 0;
+    for (int i : island_.rows)
+      for (const Side& side : solver_.rows_[i].sides) singles += side.single && side.moves;
+    pool_.resize(singles * 72);
+    double* at = pool_.data();
+    for (size_t k = 0; k < patches_.size(); ++k) {
+      const Row& row = solver_.rows_[island_.rows[k]];
+      for (int s = 0; s < row.sides_used; ++s) {
+        const Side& side = row.sides[s];
+        if (!side.moves) continue;
+        Part& part = patches_[k].parts[s];
+        const double* pool = solver_.pool_.data();
+        part = {place(island_, side), side.coordinates, pool + side.rows, pool + side.answers};
+        if (!side.single) continue;
+        rows_of(row, side, at), answers_of(row, side, at + 36);
+        part.rows = at, part.answers = at + 36;
+        at += 72;
+      }
     }
-    rows.resize(6 * n);
+  }
+
+  static void rows_of(const Row& row, const Side& side, double* rows) {
     for (int c = 0; c < 6; ++c) {
       Vec3 axis{};
       (c % 3 == 0 ? axis.x : c % 3 == 1 ? axis.y : axis.z) = side.sign;
       const Six slip = row.local(c < 3 ? Screw{axis, {}} : Screw{cross(axis, side.arm), axis});
-      for (int i = 0; i < 3; ++i) rows[i * n + c] = slip.normal[i], rows[(i + 3) * n + c] = slip.tangential[i];
+      for (int i = 0; i < 3; ++i) rows[i * 6 + c] = slip.normal[i], rows[(i + 3) * 6 + c] = slip.tangential[i];
     }
   }
 
-  /// The change of each coordinate of a side by a wrench, in 1 s: rows of 6.
-  void answers_of(const Row& row, const Side& side, std::vector<double>& answers) const {
-    if (!side.single) {
-      answers.assign(&solver_.pool_[side.answers], &solver_.pool_[side.answers] + 6 * size_t(side.coordinates));
-      return;
-    }
-    answers.resize(36);
+  void answers_of(const Row& row, const Side& side, double* answers) const {
     for (int k = 0; k < 6; ++k) {
       Six unit;
       (k < 3 ? unit.normal : unit.tangential)[k % 3] = side.sign;
@@ -777,40 +795,37 @@ class ContactSolver::Newton {
 
   /// Adds the change of a patch's wrench to the system.
   void add(const Row& row, const OfPatch& of, double duration) {
-    std::array<int, 2> block_of{};
-    for (int s = 0; s < row.sides_used; ++s) {
-      const Side& side = row.sides[s];
-      if (!side.moves) continue;
-      block_of[s] = place(island_, side);
-      answers_of(row, side, answers_[s]);
-      for (int c = 0; c < side.coordinates; ++c)
+    for (const Part& part : of.parts) {
+      for (int c = 0; c < part.coordinates; ++c)
         for (int k = 0; k < 6; ++k)
-          right_[system_.first(block_of[s]) + c] += duration * answers_[s][c * 6 + k] * at(of.missing, k);
+          right_[system_.first(part.block) + c] += duration * part.answers[c * 6 + k] * at(of.missing, k);
     }
-    for (int t = 0; t < row.sides_used; ++t) {
-      const Side& side = row.sides[t];
-      if (!side.moves) continue;
-      const int n = side.coordinates;
-      rows_of(row, side, rows_);
-      wrench_.assign(size_t(6) * n, 0.0);
-      for (int r = 0; r < 6; ++r)
-        for (int k = 0; k < 6; ++k)
-          for (int c = 0; c < n; ++c) wrench_[r * n + c] += of.by_slip[r][k] * rows_[k * n + c];
-      for (const auto [other, part] : row.damped_with) {
-        rows_of(solver_.rows_[other], solver_.rows_[other].sides[t], others_);
-        for (int r = 0; r < 6; ++r)
-          for (int c = 0; c < n; ++c) wrench_[r * n + c] += of.by_damping[r] * part * (others_[c] - rows_[c]);
+    for (size_t t = 0; t < 2; ++t) {
+      const Part& to = of.parts[t];
+      if (to.block < 0) continue;
+      const size_t n = to.coordinates;
+      wrench_.assign(6 * n, 0.0);
+      for (size_t r = 0; r < 6; ++r) add_product(&wrench_[r * n], &of.by_slip[r][0], to.rows, n);
+      for (const auto [other, share] : row.damped_with) {
+        const auto at = std::ranges::lower_bound(island_.rows, other) - island_.rows.begin();
+        const double* others = patches_[at].parts[t].rows;
+        for (size_t r = 0; r < 6; ++r)
+          for (size_t c = 0; c < n; ++c) wrench_[r * n + c] += of.by_damping[r] * share * (others[c] - to.rows[c]);
       }
-      for (int s = 0; s < row.sides_used; ++s) {
-        if (!row.sides[s].moves) continue;
-        double* block = system_.at(block_of[s], block_of[t]);
-        for (int i = 0; i < row.sides[s].coordinates; ++i)
-          for (int k = 0; k < 6; ++k) {
-            const double factor = duration * answers_[s][i * 6 + k];
-            for (int c = 0; c < n; ++c) block[i * n + c] -= factor * wrench_[k * n + c];
-          }
+      for (double& each : wrench_) each *= -duration;
+      for (const Part& from : of.parts) {
+        if (from.block < 0) continue;
+        double* block = system_.at(from.block, to.block);
+        for (int i = 0; i < from.coordinates; ++i) add_product(block + i * n, from.answers + i * 6, wrench_.data(), n);
       }
     }
+  }
+
+  /// Adds six factors times 6 rows of n numbers to one row.
+  static void add_product(double* to, const double* factors, const double* rows, size_t n) {
+    const double *r0 = rows, *r1 = r0 + n, *r2 = r1 + n, *r3 = r2 + n, *r4 = r3 + n, *r5 = r4 + n;
+    const double f0 = factors[0], f1 = factors[1], f2 = factors[2], f3 = factors[3], f4 = factors[4], f5 = factors[5];
+    for (size_t c = 0; c < n; ++c) to[c] += f0 * r0[c] + f1 * r1[c] + f2 * r2[c] + f3 * r3[c] + f4 * r4[c] + f5 * r5[c];
   }
 
   const ContactSolver& solver_;
@@ -820,9 +835,8 @@ class ContactSolver::Newton {
   bool afresh_;  ///< sticking forces are shared anew
   int steps_ = 0;
   std::vector<OfPatch> patches_;
-  std::vector<double> right_, moved_;
-  std::array<std::vector<double>, 2> answers_;
-  std::vector<double> rows_, others_, wrench_;
+  std::vector<double> right_, moved_, wrench_;
+  std::vector<double> pool_;  ///< of parts of bodies of one link
 };
 
 /// Extrapolates the wrenches after a sweep there and back (Nesterov 1983). It begins anew when the sweeps go against
