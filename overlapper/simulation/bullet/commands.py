@@ -211,10 +211,15 @@ def _gains(name: str, arguments: Arguments, share: float) -> Arguments:
     mode = arguments.get("controlMode")
     if share == 1 or mode not in (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL):
         return {}
-    many = len(arguments["jointIndices"]) if name in ARRAYS else 1
-    s = "s" if name in ARRAYS else ""
-    positions, velocities = (_by_joint(arguments, (gain, gain + "s"), many) for gain in DEFAULT_GAINS)
-    told = dict(zip(DEFAULT_GAINS, zip(*(shorter(*each, share) for each in zip(positions, velocities)))))
+    told: Arguments
+    if name in ARRAYS:
+        joints = len(arguments["jointIndices"])
+        gains = zip(*(_by_joint(arguments, (gain, gain + "s"), joints) for gain in DEFAULT_GAINS))
+        short = [shorter(*each, share) for each in gains]
+        told = {"positionGains": [each for each, _ in short], "velocityGains": [each for _, each in short]}
+    else:
+        position, velocity = shorter(*(arguments.get(*each) for each in DEFAULT_GAINS.items()), share)
+        told = {"positionGain": position, "velocityGain": velocity}
     if mode == pybullet.VELOCITY_CONTROL:
-        del told["positionGain"]
-    return {gain + s: [*each] if name in ARRAYS else each[0] for gain, each in told.items()}
+        del told["positionGains" if name in ARRAYS else "positionGain"]
+    return told

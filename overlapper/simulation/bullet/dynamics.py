@@ -50,12 +50,15 @@ class BulletDynamics:
         self._masses: list[Any] = [None]  # equals no real list of masses, so that the first `read` makes a solver
         self._surface: Array = np.zeros((len(self.links), len(SURFACE)))
         self._told: list[Any] = []
+        # Of a step, with the length of its substeps. A script changes constraints between two steps.
+        self._constraints: tuple[float, Array | None] | None = None
         self.version = 0
         self.read()
 
     def read(self) -> bool:
         """Read masses and friction again. True if a mass or inertia has changed, so that there is a new solver."""
         read, client = pybullet.getDynamicsInfo, self._client
+        self._constraints = None
         told = [read(id, link, client) for id, link in self.links]
         gravity = self._gravity()
         if [gravity, told] == self._told:
@@ -185,11 +188,9 @@ class BulletDynamics:
         pairs = map(pybullet.getBaseVelocity, self._joints, repeat(client))
         bases = np.fromiter(flattened(flattened(pairs)), float, 6 * len(self._joints))
         velocity[self._of_bases] = bases.reshape(-1, 6)
-        self._positions: list[tuple[int, int, float, int]] = []  # of joints: body, joint, position and coordinate
-        for id, joints, at in self._single:
-            states = pybullet.getJointStates(id, joints, client)
+        self._states = [pybullet.getJointStates(id, joints, client) for id, joints, _ in self._single]
+        for (_, _, at), states in zip(self._single, self._states):
             velocity[at] = [state[1] for state in states]
-            self._positions += zip(repeat(id), joints, [state[0] for state in states], at)
         for id, joints, at in self._spherical:
             states = pybullet.getJointStatesMultiDof(id, joints, client)
             velocity[at] = [each for state in states for each in state[1]]
@@ -199,18 +200,21 @@ class BulletDynamics:
         servos = self._commands.servos
         if not servos:
             return None
-        rows = [
-            (coordinate, *servo.in_a_step(at, length, share))
-            for id, joint, at, coordinate in self._positions
-            if (servo := servos.get((id, joint))) and servo.force > 0 and math.isfinite(at)
-        ]
+        rows: list[float] = []
+        for (id, joints, coordinates), states in zip(self._single, self._states):
+            for joint, coordinate, state in zip(joints, coordinates, states):
+                servo = servos.get((id, joint))
+                if servo and servo.force > 0 and math.isfinite(state[0]):
+                    rows += (coordinate, *servo.in_a_step(state[0], length, share))
         return np.array(rows).reshape(-1, 4)
 
     def constraints(self, length: float) -> Array | None:
-        if not pybullet.getNumConstraints(self._client):
-            return None
-        commands = self._commands
-        return constraints(self._client, self.place, commands.changes(), commands.error_reduction, length)
+        if self._constraints is None or self._constraints[0] != length:
+            commands, found = self._commands, None
+            if pybullet.getNumConstraints(self._client):
+                found = constraints(self._client, self.place, commands.changes(), commands.error_reduction, length)
+            self._constraints = length, found
+        return self._constraints[1]
 
     def ahead(self, duration: float, velocity: Array) -> None:
         return None
@@ -219,8 +223,7 @@ class BulletDynamics:
         """Let forces and torques (n, 6) about their centres of mass act on the links in the simulator's next step."""
         client, axes = self._client, pybullet.WORLD_FRAME
         push, turn = unheard("applyExternalForce"), unheard("applyExternalTorque")
-        for k in np.flatnonzero(wrenches.any(axis=1)).tolist():
-            id, link = self.links[k]
-            wrench = wrenches[k].tolist()
-            push(id, link, wrench[:3], frames[k][0], axes, client)
-            turn(id, link, wrench[3:], axes, client)
+        for (id, link), wrench, frame in zip(self.links, wrenches.tolist(), frames):
+            if any(wrench):
+                push(id, link, wrench[:3], frame[0], axes, client)
+                turn(id, link, wrench[3:], axes, client)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from overlapper.simulation.model import Array
 
 
@@ -26,10 +24,10 @@ class LearntForces:
     def learnt(self, velocity: Array) -> Array:
         """Return the acceleration by everything except contacts, now that the coordinates have this velocity."""
         # It is told by how velocities have changed, unless somebody has set them since.
-        if self._before and (self._left is None or np.array_equal(self._left, velocity)):
+        if self._before and (self._left is None or (self._left == velocity).all()):
             before, length, ours = self._before
             # After forces() nothing may have moved; a body that rests to the last bit tells nothing new.
-            if not np.array_equal(before, velocity):
+            if not (before == velocity).all():
                 self._acceleration = (velocity - before) / length - ours
         return self._acceleration
 

@@ -60,7 +60,7 @@ def coming(
         return Coming()
     solver = masses.dynamics.solver.copy() if frequencies else None
     deep, highest = False, 0.0
-    overlapping = _codes(now.pairs[now.volume > 0])
+    overlapping = _codes(now.pairs[now.volume > 0])  # sorted, as all pairs are
     known: set[tuple[int, int]] | None = None
     # A small and fast body is swallowed within the step: then it counts when it was half in, and for how long.
     lost: set[tuple[int, int]] = set()
@@ -69,11 +69,13 @@ def coming(
         pairs, poses = masses.pairs_ahead(part * duration, velocity, among)
         if not frequencies:
             # A pair that overlaps already and moves by less than half of a size is not swallowed.
-            pairs = pairs[~np.isin(_codes(pairs), overlapping) | masses.are_far(pairs, ways)]
+            pairs = pairs[~_among(_codes(pairs), overlapping) | masses.are_far(pairs, ways)]
+            if not len(pairs) and not lost:
+                break
         found = masses.overlaps_at(pairs, poses)
         if solver:
             highest = max(highest, float(masses.place(solver, frames, found)[0].max(initial=0.0)))
-        new = np.flatnonzero((found.volume > 0) & ~np.isin(_codes(found.pairs), overlapping))
+        new = np.flatnonzero((found.volume > 0) & ~_among(_codes(found.pairs), overlapping))
         deep = deep or masses.are_deep(found.pairs[new], found.depth[new])
         swallowed = _swallowed(found)
         if swallowed:
@@ -104,3 +106,11 @@ def _codes(pairs: NDArray[np.int32]) -> NDArray[np.int64]:
     """Return a number for each pair."""
     wide = pairs.astype(np.int64)
     return np.asarray(wide[:, 0] << 32 | wide[:, 1])
+
+
+def _among(codes: NDArray[np.int64], known: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return whether each number is among the `known` ones, which are sorted."""
+    if not len(known):
+        return np.zeros(len(codes), dtype=bool)
+    places = np.minimum(np.searchsorted(known, codes), len(known) - 1)
+    return np.asarray(known[places] == codes)

@@ -56,6 +56,7 @@ class Masses:
         self._batch = Batch(bodies.shapes)  # for what is not yet: the one of `bodies` knows what is
         # By the pairs of shapes, as long as the simulator's numbers are the same.
         self._known: dict[bytes, _Pairs] = {}
+        self._last: tuple[Overlaps, _Pairs] | None = None
         self._version = -1
 
     def are_stale(self) -> bool:
@@ -143,7 +144,9 @@ class Masses:
 
     def _of(self, found: Overlaps) -> _Pairs:
         if self._version != self.dynamics.version or len(self._known) > REMEMBERED:
-            self._known, self._version = {}, self.dynamics.version
+            self._known, self._version, self._last = {}, self.dynamics.version, None
+        if self._last and self._last[0] is found:
+            return self._last[1]
         key = found.pairs.tobytes()
         if key not in self._known:
             links = self._links[found.pairs]
@@ -151,6 +154,7 @@ class Masses:
                 self._layers.of(links, self.dynamics, self.sizes),
                 np.asarray(self.sizes[links].min(axis=1)),
             )
+        self._last = found, self._known[key]
         return self._known[key]
 
     def velocity(self) -> tuple[Array, set[int]]:
@@ -159,7 +163,7 @@ class Masses:
         Velocities that are not finite are 0. The lost bodies are those that such velocities move.
         """
         velocity = self.dynamics.velocity()
-        if np.abs(velocity).max(initial=0.0) < FARTHEST:
+        if velocity.dot(velocity) < FARTHEST**2 or np.abs(velocity).max() < FARTHEST:
             return velocity, set()
         finite = np.abs(velocity) < FARTHEST
         bodies = self._bodies
