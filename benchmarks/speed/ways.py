@@ -68,7 +68,7 @@ TYPICAL = {
         "dual hull", (BALLS[1280],), (BALLS[1280], ASIDE, TURN), (BALLS[1280], (0.1, -0.6, 0.4), ABOUT_Z)
     ),
     "a mesh of 320 facets and the same once more": typical("dual hull", (BALLS[320],), (BALLS[320],)),
-    "two boxes flush at the sides": typical("dual hull", BOX, (CUBE, (0, 0, 0.7))),
+    "two boxes flush at the sides": typical("clipping", BOX, (CUBE, (0, 0, 0.7))),
     "a ball in the floor": typical("closed form", (BALL, (0, 0, 0.3)), FLOOR),
     "a cylinder, tilted, in the floor": typical("closed form", (CAN, (0, 0, 0.3), TURN), FLOOR),
     "a ball on the face of a box": typical("closed form", (BALL, (0.01, 0.02, 0.9)), BOX),
@@ -87,7 +87,7 @@ TYPICAL = {
     "a rounded hull of 80 facets and a box": typical(
         "closed form", (RoundedHull(icosphere(1), 0.05),), (CUBE, (0.9, 0.3, 0.4), TURN)
     ),
-    "a box stacked on another, flush, 1 µm deep": typical("wide dual hull", BOX, (CUBE, (0, 0, 1 - 1e-6))),
+    "a box stacked on another, flush, 1 µm deep": typical("wide clipping", BOX, (CUBE, (0, 0, 1 - 1e-6))),
     "a box resting on another, 1e-14 m deep": typical("wide dual hull", BOX, (CUBE, (0.1, 0.2, 1 - 1e-14), ABOUT_Z)),
     "two boxes, 4e-15 m apart": typical("wide separation", BOX, (CUBE, (1 + 4e-15, 0, 0))),
     "two boxes that touch": typical("doubt", BOX, (CUBE, (1, 0.2, 0.1))),

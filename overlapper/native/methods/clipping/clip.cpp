@@ -4,6 +4,7 @@
 
 #include "geometry/constants.h"
 #include "geometry/rounding.h"
+#include "methods/clipping/flush_walls.h"
 #include "methods/clipping/sign_table.h"
 #include "shapes/canonical_order.h"
 #include "shapes/local_measures.h"
@@ -18,6 +19,8 @@ struct Workspace : TableClipping {
   std::vector<double> extent;     ///< per vertex: the sum of its coordinates over their size
   std::vector<Vec3> area_vector;  ///< per facet: twice its area vector
   std::vector<WideLanes> wide_planes;
+  std::vector<Vec3> by_doubles;  ///< the vertices before they are placed in wider arithmetic
+  std::vector<MovedWall> moved;  ///< walls that do not bound the common polytope, as another wall is flush with them
 };
 
 Workspace& workspace() {
@@ -211,39 +214,61 @@ double area_by_corners(Workspace& w) {
   return area;
 }
 
+/// What the moved walls may cut off from the common polytope. That is no larger than its projection to the wall times
+/// the way that it reaches beyond. Rounding makes the projection less than twice as large.
+double cut_off(Workspace& w) {
+  if (w.moved.empty()) return 0;
+  area_by_corners(w);
+  double volume = 0;
+  for (const MovedWall& wall : w.moved) {
+    double projection = 0;  // each point of it is covered by two facets, and area vectors are twice as long
+    for (Vec3 area : w.area_vector) projection += std::abs(dot(area, wall.normal)) / 4;
+    volume += 2 * wall.beyond * projection;
+  }
+  return volume;
+}
+
 /// Measures the common polytope again about `middle`, from corners placed in wider arithmetic. Leaves `common`
 /// unchanged if even that is not accurate enough.
-void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reach, double least_slack, Vec3 middle,
-                     Measures& measures, Pull& on_first, WantedPatch* wanted) {
+void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reach, double least_slack, double cut,
+                     Vec3 middle, Measures& measures, Pull& on_first, WantedPatch* wanted) {
   const Mat3 axes = thin_axes(w, middle);
-  const std::optional<double> corner_rounding =
-      place_in_wide({a, b, w.first.facets, w.apex, w.corners, middle, reach}, axes, w.vertices, w.wide_planes);
-  if (!corner_rounding) return;
-  Vec3 size;
-  for (Vec3 v : w.vertices) size = max(size, abs(v));
-  Sums sums(w, size);
-  const double area = area_by_corners(w);
-  // The axes are orthogonal and of length 1 but for a few roundings.
-  const double error =
-      moved_volume(area, *corner_rounding, least_slack) + sums.volume_rounding() + 16 * 0x1p-53 * sums.volume();
-  if (!(error <= kEnough * sums.volume())) return;
+  w.by_doubles.assign(w.vertices.begin(), w.vertices.end());
+  std::optional<Sums> sums;
+  double area = 0, error = kInfinity;
+  for (Approach approach : {Approach::kOnce, Approach::kTwice}) {
+    std::ranges::copy(w.by_doubles, w.vertices.begin());
+    const std::optional<double> corner_rounding = place_in_wide(
+        {a, b, w.first.facets, w.apex, w.corners, middle, reach}, axes, w.vertices, w.wide_planes, approach);
+    if (!corner_rounding) return;
+    Vec3 size;
+    for (Vec3 v : w.vertices) size = max(size, abs(v));
+    sums.emplace(w, size);
+    area = area_by_corners(w);
+    // The axes are orthogonal and of length 1 but for a few roundings.
+    error = moved_volume(area, *corner_rounding, least_slack) + sums->volume_rounding() +
+            16 * 0x1p-53 * sums->volume() + cut;
+    if (error <= kEnough * sums->volume()) break;
+  }
+  if (!(error <= kEnough * sums->volume())) return;
   measures.measured = true;
   measures.way = Way::kWideClipping;
-  measures.volume = sums.volume();
+  measures.volume = sums->volume();
   measures.volume_error = error;
   measures.area = area;
-  measures.centroid = middle + apply_transposed(axes, sums.centroid());
-  const Pull pull = sums.pull();
+  measures.centroid = middle + apply_transposed(axes, sums->centroid());
+  const Pull pull = sums->pull();
   on_first = {apply_transposed(axes, pull.force), apply_transposed(axes, pull.moment)};
   if (!wanted) return;
   if (wanted->direction) wanted->direction = axes * *wanted->direction;
-  wanted->find(w, sums.centroid(), pull.force);
+  wanted->find(w, sums->centroid(), pull.force);
   wanted->patch = turned(wanted->patch, transposed(axes), middle);
 }
 
 /// Measures by sums in doubles, about `middle`. False if a plane is nearer to `middle` than `least_slack`, which
-/// becomes the distance of the nearest plane.
-bool measure(Workspace& w, const Sums& sums, Vec3 middle, double rounding, double& least_slack, Measures& common) {
+/// becomes the distance of the nearest plane. Up to `cut` of the volume may be cut off.
+bool measure(Workspace& w, const Sums& sums, Vec3 middle, double rounding, double cut, double& least_slack,
+             Measures& common) {
   common.status = Status::kOverlapping;
   common.way = Way::kClipping;
   common.volume = sums.volume();
@@ -256,7 +281,7 @@ bool measure(Workspace& w, const Sums& sums, Vec3 middle, double rounding, doubl
   });
   if (!(nearest > least_slack)) return false;
   least_slack = nearest;
-  common.volume_error = moved_volume(common.area, rounding, least_slack) + sums.volume_rounding();
+  common.volume_error = moved_volume(common.area, rounding, least_slack) + sums.volume_rounding() + cut;
   common.measured = common.volume_error <= kEnough * common.volume;
   return true;
 }
@@ -274,15 +299,19 @@ bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_
   Workspace& w = workspace();
   set_solid(w.first, a, 0, nullptr, 4 * reach);
   set_solid(w.second, b, 1, &pose, 4 * reach);
-  const Signs signs = w.run(doubt);
+  w.moved.clear();
+  Signs signs = w.run(doubt, true);
+  if (signs == Signs::kUncertain && move_flush_walls(w.first, w.second, doubt, w.moved)) signs = w.run(doubt, true);
   if (signs != Signs::kCertain) return signs == Signs::kSeparated;
   const Vec3 middle = centre(w.vertices);
   const Sums sums(w, {1, 1, 1});
   double least_slack = 4 * doubt;  // rounding might hide thinner sets
-  if (!measure(w, sums, middle, rounding(reach) + flat, least_slack, common)) return false;
-  if (!common.measured) {
-    measure_widened(w, a, b, reach, least_slack, middle, common, on_first, wanted);
-    return true;
+  const double cut = cut_off(w);
+  if (!measure(w, sums, middle, rounding(reach) + flat, cut, least_slack, common)) return false;
+  if (!common.measured || w.shallow) {
+    common.measured = false;
+    measure_widened(w, a, b, reach, least_slack, cut, middle, common, on_first, wanted);
+    return common.measured || (w.moved.empty() && !w.shallow);
   }
   on_first = sums.pull();
   if (!wanted) return true;
@@ -407,7 +436,7 @@ std::optional<Measures> clip(std::span<const Placed> bodies) {
   const double rounded = rounding(far) + 3 * 0x1p-53 * far * static_cast<double>(bodies.size()) + flat;
   double least_slack = 4 * doubt;
   std::optional<Measures> common(std::in_place);
-  if (!measure(w, sums, middle, rounded, least_slack, *common) || !common->measured) return std::nullopt;
+  if (!measure(w, sums, middle, rounded, 0, least_slack, *common) || !common->measured) return std::nullopt;
   common->pulls_of_group.resize(bodies.size());
   add_pulls(w, first.pose, common->centroid - middle, common->pulls_of_group);
   const Vec3 centroid = first.pose.rotation * common->centroid;

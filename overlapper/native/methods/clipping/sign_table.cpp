@@ -65,6 +65,18 @@ struct EdgeSigns {
     return planes == 1;  // This is the crossed plane itself, by rounding.
   }
 
+  /// The same, one plane at a time: the error is along the edge, so it counts less for planes that are nearly parallel
+  /// to the edge.
+  bool certain_by_plane(Crossing crossing) const {
+    const double slope = std::abs(to[crossing.plane] - from[crossing.plane]);
+    for (int j = 0; j < stride; ++j) {
+      const double way = to[j] - from[j];
+      if (j != crossing.plane && !(from[j] + crossing.at * way < -2 * rounding * (1 + std::abs(way) / slope)))
+        return false;
+    }
+    return true;
+  }
+
   Crossing at_plane(int g) const { return {g, from[g] / (from[g] - to[g])}; }
 
   /// The plane through which the edge leaves from an end that is inside.
@@ -188,7 +200,8 @@ bool SignTable::beyond_a_plane(double margin) const {
 template <class Lanes>
 class EdgeCutter {
  public:
-  EdgeCutter(TableClipping& clipping, double rounding) : w_(clipping), rounding_(rounding) {}
+  EdgeCutter(TableClipping& clipping, double rounding, bool may_be_shallow)
+      : w_(clipping), rounding_(rounding), may_be_shallow_(may_be_shallow) {}
 
   Signs run() {
     const Signs one = w_.first_signs.template fill<Lanes>(w_.first, w_.second, rounding_);
@@ -248,7 +261,10 @@ class EdgeCutter {
         const double length = std::abs(along.x) + std::abs(along.y) + std::abs(along.z);
         const auto cross = [&](Crossing crossing, bool enters, int& vertex) {
           const double doubt = edge.doubt(crossing, length);
-          if (!edge.template certain<Lanes>(crossing, doubt)) return false;
+          if (!edge.template certain<Lanes>(crossing, doubt)) {
+            if (!may_be_shallow_ || !edge.certain_by_plane(crossing)) return false;
+            w_.shallow = true;
+          }
           vertex = add_vertex(from + crossing.at * along, doubt,
                               {-1, -1, {common.left, common.right, crossing.plane + other_offset}});
           meet(e, crossing.plane, vertex, enters, is_first);
@@ -290,20 +306,21 @@ class EdgeCutter {
 
   TableClipping& w_;
   double rounding_;
+  bool may_be_shallow_;
 };
 
 namespace {
 
-using Run = Signs(TableClipping&, double rounding);
+using Run = Signs(TableClipping&, double rounding, bool may_be_shallow);
 
 template <class Lanes>
-Signs run_by(TableClipping& clipping, double rounding) {
-  return EdgeCutter<Lanes>(clipping, rounding).run();
+Signs run_by(TableClipping& clipping, double rounding, bool may_be_shallow) {
+  return EdgeCutter<Lanes>(clipping, rounding, may_be_shallow).run();
 }
 
 #ifdef OVERLAPPER_WIDER
-OVERLAPPER_WIDER Signs run_by_wider(TableClipping& clipping, double rounding) {
-  return run_by<Quad>(clipping, rounding);
+OVERLAPPER_WIDER Signs run_by_wider(TableClipping& clipping, double rounding, bool may_be_shallow) {
+  return run_by<Quad>(clipping, rounding, may_be_shallow);
 }
 Run* fastest_run() { return is_wider() ? run_by_wider : run_by<MostLanes>; }
 #else
@@ -312,10 +329,11 @@ Run* fastest_run() { return run_by<MostLanes>; }
 
 }  // namespace
 
-Signs TableClipping::run(double rounding) {
+Signs TableClipping::run(double rounding, bool may_be_shallow) {
+  shallow = false;
   static Run* const run_fastest = fastest_run();
   planes_asked += first.facets + second.facets;
-  return run_fastest(*this, rounding);
+  return run_fastest(*this, rounding, may_be_shallow);
 }
 
 void TableClipping::take_common(double beyond) {

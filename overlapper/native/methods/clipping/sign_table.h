@@ -65,9 +65,11 @@ struct TableClipping {
   RoomyList<double> doubt;          ///< parallel to `vertices`: see Solid
   RoomyList<Edge> edges;            ///< of the common polytope
   RoomyList<Edge> seam;             ///< its edges between facets of the first body, on the left, and of the second body
+  bool shallow = false;  ///< a corner is certain beside its planes alone, as an edge is nearly parallel to a plane
 
-  /// Finds the common polytope; none for separated or uncertain solids.
-  Signs run(double rounding);
+  /// Finds the common polytope; none for separated or uncertain solids. Corners on edges that are nearly parallel to a
+  /// plane are uncertain unless `may_be_shallow`.
+  Signs run(double rounding, bool may_be_shallow = false);
 
   int owner(int facet) const { return facet < first.facets ? first.owner[facet] : second.owner[facet - first.facets]; }
 

@@ -80,7 +80,8 @@ class WideCorners {
     return true;
   }
 
-  void place(const Mat3& axes, std::span<Vec3> vertices) {
+  void place(const Mat3& axes, std::span<Vec3> vertices, Approach approach) {
+    approach_ = approach;
     for (size_t i = 0; i < vertices.size(); i += 4) {
       const size_t last = vertices.size() - 1;
       place_four(axes, vertices, {i, std::min(i + 1, last), std::min(i + 2, last), std::min(i + 3, last)});
@@ -129,7 +130,10 @@ class WideCorners {
     const QuadVector vertex(vertices[at[0]], vertices[at[1]], vertices[at[2]], vertices[at[3]]);
     QuadVector way{Vec3{}, Vec3{}, Vec3{}, Vec3{}};
     const std::span<const CornerSource> corners = common_.corners;
-    if (std::ranges::any_of(at, [&](size_t i) { return corners[i].vertex < 0; })) beside_planes(at, vertex, way);
+    if (std::ranges::any_of(at, [&](size_t i) { return corners[i].vertex < 0; })) {
+      if (approach_ == Approach::kOnce) beside_planes(at, vertex, way);
+      else beside_parallel_planes(at, vertex, way);
+    }
     for (int n = 0; n < 4; ++n) {
       if (corners[at[n]].vertex < 0) continue;
       const Vec3 beside = beside_vertex(corners[at[n]], vertices[at[n]]);
@@ -146,13 +150,15 @@ class WideCorners {
     for (int n = 0; n < 4; ++n) vertices[at[n]] = {x.head[n], y.head[n], z.head[n]};
   }
 
+  /// Four planes, those number n of each corner, with a coordinate of their normals in each column.
+  WideColumns planes(const std::array<size_t, 4>& at, int n) const {
+    const auto plane = [&](size_t i) -> const WideLanes& { return planes_[common_.corners[i].facets[n]]; };
+    return transposed(plane(at[0]), plane(at[1]), plane(at[2]), plane(at[3]));
+  }
+
   /// The steps from vertices placed by doubles to the point where three planes meet; meaningless for other corners.
   void beside_planes(const std::array<size_t, 4>& at, const QuadVector& vertex, QuadVector& way) {
-    const auto planes = [&](int n) {
-      const auto plane = [&](size_t i) -> const WideLanes& { return planes_[common_.corners[i].facets[n]]; };
-      return transposed(plane(at[0]), plane(at[1]), plane(at[2]), plane(at[3]));
-    };
-    const WideColumns p = planes(0), q = planes(1), r = planes(2);
+    const WideColumns p = planes(at, 0), q = planes(at, 1), r = planes(at, 2);
     const auto height = [&](const WideColumns& normal) {
       WideSum<fused> sum(normal, vertex);
       sum.add(normal[3]);
@@ -179,6 +185,42 @@ class WideCorners {
       if (common_.corners[at[n]].vertex < 0) corner_rounding_ = std::max(corner_rounding_, rounding[n]);
   }
 
+  /// The same in two steps: the second ends the error of the first where two of the planes are nearly parallel.
+  void beside_parallel_planes(const std::array<size_t, 4>& at, const QuadVector& vertex, QuadVector& way) {
+    const std::array<WideColumns, 3> normals{planes(at, 0), planes(at, 1), planes(at, 2)};
+    const QuadVector qr = cross(normals[1], normals[2]), rp = cross(normals[2], normals[0]),
+                     pq = cross(normals[0], normals[1]);
+    const Quad volume = normals[0][0].head * qr.x + normals[0][1].head * qr.y + normals[0][2].head * qr.z;
+    Quad height[3];
+    const auto find_heights = [&] {
+      for (int n = 0; n < 3; ++n) {
+        WideSum<fused> sum(normals[n], vertex);
+        sum.add(normals[n][3]);
+        sum.add_product(normals[n][0], way.x);
+        sum.add_product(normals[n][1], way.y);
+        sum.add_product(normals[n][2], way.z);
+        height[n] = sum.lanes().head;
+      }
+    };
+    find_heights();
+    for (int step = 0; step < 2; ++step) {
+      const Quad &a = height[0], &b = height[1], &c = height[2];
+      way.x -= (a * qr.x + b * rp.x + c * pq.x) / volume;
+      way.y -= (a * qr.y + b * rp.y + c * pq.y) / volume;
+      way.z -= (a * qr.z + b * rp.z + c * pq.z) / volume;
+      find_heights();
+    }
+    for (int i = 0; i < 4; ++i) {
+      if (common_.corners[at[i]].vertex >= 0) continue;
+      double highest = 0;
+      for (const Quad& each : height) highest = std::max(highest, std::abs(each[i]));
+      // The sums along the axes round the way once more.
+      const double rounded = 0x1p-50 * (std::abs(way.x[i]) + std::abs(way.y[i]) + std::abs(way.z[i]));
+      const double off = highest + rounded + 2 * wide_rounding_;
+      corner_rounding_ = off > corner_rounding_ || std::isnan(off) ? off : corner_rounding_;
+    }
+  }
+
   /// The step from a vertex placed by doubles to the body's own vertex.
   Vec3 beside_vertex(const CornerSource& corner, Vec3 vertex) const {
     const Shape& shape = corner.body == 0 ? common_.a.shape : common_.b.shape;
@@ -200,24 +242,26 @@ class WideCorners {
   WideLanes translation_;   ///< applied after the rotation
   double wide_rounding_;    ///< m: of a few dozen operations in double-double
   double corner_rounding_;  ///< m: largest, of the corners placed so far
+  Approach approach_ = Approach::kOnce;
 };
 
 using Placing = std::optional<double>(const CommonCorners&, const Mat3& axes, std::span<Vec3> vertices,
-                                      std::span<WideLanes> planes);
+                                      std::span<WideLanes> planes, Approach approach);
 
 template <bool fused>
 std::optional<double> place_by(const CommonCorners& common, const Mat3& axes, std::span<Vec3> vertices,
-                               std::span<WideLanes> planes) {
+                               std::span<WideLanes> planes, Approach approach) {
   WideCorners<fused> wide(common, planes);
   if (!wide.add_planes()) return std::nullopt;
-  wide.place(axes, vertices);
+  wide.place(axes, vertices, approach);
   return wide.corner_rounding();
 }
 
 #ifdef OVERLAPPER_WIDER
 OVERLAPPER_WIDER std::optional<double> place_by_wider(const CommonCorners& common, const Mat3& axes,
-                                                      std::span<Vec3> vertices, std::span<WideLanes> planes) {
-  return place_by<true>(common, axes, vertices, planes);
+                                                      std::span<Vec3> vertices, std::span<WideLanes> planes,
+                                                      Approach approach) {
+  return place_by<true>(common, axes, vertices, planes, approach);
 }
 Placing* fastest_placing() { return is_wider() ? place_by_wider : place_by<kFused>; }
 #else
@@ -230,13 +274,13 @@ Placing* fastest_placing() { return place_by<kFused>; }
 }  // namespace
 
 std::optional<double> place_in_wide(const CommonCorners& common, const Mat3& axes, std::span<Vec3> vertices,
-                                    std::vector<WideLanes>& planes) {
+                                    std::vector<WideLanes>& planes, Approach approach) {
   planes.resize(common.apex.size());
 #ifndef NDEBUG
   std::vector<Vec3> expected(vertices.begin(), vertices.end());
-  place_by<false>(common, axes, expected, planes);
+  place_by<false>(common, axes, expected, planes, approach);
 #endif
-  const std::optional<double> rounding = fastest_placing()(common, axes, vertices, planes);
+  const std::optional<double> rounding = fastest_placing()(common, axes, vertices, planes, approach);
   assert(std::ranges::equal(vertices, expected, same));
   return rounding;
 }

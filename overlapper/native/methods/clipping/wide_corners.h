@@ -26,8 +26,15 @@ struct CommonCorners {
   double reach;  ///< m: size of the numbers that describe the bodies in these coordinates
 };
 
+/// How often a corner between three facets is moved towards the point where their planes meet.
+enum class Approach {
+  kOnce,   ///< the length is that of the corner's error
+  kTwice,  ///< the length is the largest distance of the corner from its planes: facets may be nearly parallel
+};
+
 /// Replaces the corners' coordinates from doubles by coordinates along orthogonal axes, the rows of `axes`. The error
-/// of each is half an ulp of itself plus the returned length, in m. Works in double-double from the numbers that define
+/// of each is half an ulp of itself plus the returned length, in m. With `kTwice`, only its distances from its planes
+/// are. Works in double-double from the numbers that define
 /// the bodies: corners of hulls, half extents, positions and orientations. An orientation is the exact rotation of its
 /// quaternion of any length. No value if only rounding has merged the triangles of a facet.
 ///
@@ -35,6 +42,6 @@ struct CommonCorners {
 /// to 1e-10 m, and 1.2 times over the sliver families. In the scenes the difference is within the scatter (medians of 7
 /// interleaved rounds, processor time).
 std::optional<double> place_in_wide(const CommonCorners& common, const Mat3& axes, std::span<Vec3> vertices,
-                                    std::vector<WideLanes>& planes);
+                                    std::vector<WideLanes>& planes, Approach approach = Approach::kOnce);
 
 }  // namespace overlapper
