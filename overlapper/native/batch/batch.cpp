@@ -49,14 +49,15 @@ Overlaps::Row row_of(Overlap overlap) {
   return row;
 }
 
-/// `patch` gets the patch of a pair that clipping has measured, unless it is null.
-Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method method, std::optional<Patch>* patch) {
+/// `patch` gets the patch of a pair that clipping has measured, unless it is null. The way out may be deferred.
+Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method method, std::optional<Patch>* patch,
+                     bool with_way) {
   if (method == Method::kAuto) {
     std::optional<Measures> at_once = measure_at_once(a, b, nullptr, patch);
     if (at_once && at_once->status == Status::kSeparated) return {};
     if (at_once && at_once->measured) {
-      const Penetration way = penetration_in_order(a, b);
-      return {std::move(*at_once), way.depth, way.normal, nullptr};
+      const Penetration way = with_way ? penetration_in_order(a, b) : Penetration{};
+      return {std::move(*at_once), way.depth, way.normal, nullptr, {}, !with_way};
     }
   }
   return row_of(Overlap(a, b, tolerance, method));
@@ -121,11 +122,13 @@ BodyGradients gradients(const Measures& measures) {
 void Overlaps::append(const Row& row) {
   std::apply([&](const auto&... column) { ((this->*column.values).push_back(column.of(row)), ...); }, kColumns);
   source.push_back(row.source);
+  deferred.push_back(row.deferred);
 }
 
 void Overlaps::reserve(size_t rows) {
   std::apply([&](const auto&... column) { ((this->*column.values).reserve(rows), ...); }, kColumns);
   source.reserve(rows);
+  deferred.reserve(rows);
 }
 
 Placed Overlaps::placed(int body) const {
@@ -137,6 +140,34 @@ std::shared_ptr<Overlap> Overlaps::overlap(size_t row) const {
   if (auto known = source[row].lock()) return known;
   return std::make_shared<Overlap>(placed(pairs[row][0]), placed(pairs[row][1]), tolerance, method);
 }
+
+Penetration Overlaps::way_of(size_t row) const {
+  return penetration_in_order(placed(pairs[row][0]), placed(pairs[row][1]));
+}
+
+const Overlaps::Ways& Overlaps::ways() const {
+  return ways_->get([this] {
+    Ways found{depth, normal};
+    for (size_t row = 0; row < size(); ++row) {
+      if (!deferred[row]) continue;
+      const Penetration out = way_of(row);
+      found.depth[row] = out.depth, found.normal[row] = out.normal;
+    }
+    return found;
+  });
+}
+
+const std::vector<double>& Overlaps::depths() const {
+  if (ways_asked) ways_asked->store(true, std::memory_order_relaxed);
+  return std::ranges::find(deferred, 1) == deferred.end() ? depth : ways().depth;
+}
+
+const std::vector<Vec3>& Overlaps::normals() const {
+  if (ways_asked) ways_asked->store(true, std::memory_order_relaxed);
+  return std::ranges::find(deferred, 1) == deferred.end() ? normal : ways().normal;
+}
+
+Vec3 Overlaps::normal_of(size_t row) const { return deferred[row] ? way_of(row).normal : normal[row]; }
 
 const std::vector<double>& Overlaps::areas() const {
   return areas_->get([this] {
@@ -267,8 +298,10 @@ Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
   };
   std::apply([&](const auto&... column) { (pick(this->*column.values, chosen.*column.values), ...); }, kColumns);
   pick(source, chosen.source);
+  pick(deferred, chosen.deferred);
   if (!clipped.empty()) pick(clipped, chosen.clipped);
   chosen.patches_asked = patches_asked;
+  chosen.ways_asked = ways_asked;
   return chosen;
 }
 
@@ -285,7 +318,7 @@ struct Batch::Memory {
   std::vector<Known> known, next_known;                     ///< of the last call with pairs, and of the present one
   std::vector<Overlaps::Row> rows, next_rows;               ///< parallel to `known` and `next_known`
   std::vector<std::optional<Patch>> patches, next_patches;  ///< likewise if they were asked for, else empty
-  bool with_patches = false;
+  bool with_patches = false, with_ways = true;
   std::vector<char> done;        ///< per pair of the present call
   std::atomic<size_t> asked{0};  ///< planes, in the present call
   bool sorted = false;           ///< true if `known` is sorted by pair
@@ -379,9 +412,9 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].measures.status == Status::kOverlapping;
   const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
   const size_t planes_before = planes_asked;
-  next_rows[i] = separated
-                     ? Overlaps::Row{}
-                     : row_of(a.placed, b.placed, with_tolerance, by_method, with_patches ? &next_patches[i] : nullptr);
+  next_rows[i] = separated ? Overlaps::Row{}
+                           : row_of(a.placed, b.placed, with_tolerance, by_method,
+                                    with_patches ? &next_patches[i] : nullptr, with_ways);
   next_rows[i].pair = pair.pair;
   asked.fetch_add(planes_asked - planes_before, std::memory_order_relaxed);
   done[i] = true;
@@ -451,7 +484,9 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   answer.shapes = shapes_;
   answer.poses = memory->poses;
   answer.patches_asked = patches_asked_;
+  answer.ways_asked = ways_asked_;
   memory->with_patches = patches_asked_->load(std::memory_order_relaxed);
+  memory->with_ways = ways_asked_->exchange(false, std::memory_order_relaxed);
   const auto listed = [&](size_t i) {
     return memory->done[i] && (separated || memory->next_rows[i].measures.status != Status::kSeparated);
   };

@@ -49,6 +49,7 @@ struct Overlaps {
     Vec3 normal;                      ///< {0, 0, 0} if separated
     std::shared_ptr<Overlap> source;  ///< set if the measures needed an Overlap
     IndexPair pair{};
+    bool deferred = false;  ///< depth and normal are not known yet
   };
 
   // kColumns documents each column.
@@ -59,6 +60,7 @@ struct Overlaps {
   std::vector<double> volume, volume_error, area_bound, depth;
   std::vector<Vec3> centroid, normal;
   std::vector<BodyGradients> gradient;
+  std::vector<char> deferred;  ///< per row: depth and normal are found on first use, see ways()
 
   /// The Overlap of a row, while the batch keeps it; empty if it is cheap to make again.
   std::vector<std::weak_ptr<Overlap>> source;
@@ -67,6 +69,7 @@ struct Overlaps {
   /// batch.
   std::vector<std::optional<Patch>> clipped;
   std::shared_ptr<std::atomic<bool>> patches_asked;  ///< of any results of the batch; null without a batch
+  std::shared_ptr<std::atomic<bool>> ways_asked;     ///< of the last results of the batch; null without a batch
 
   size_t examined = 0;      ///< pairs examined, with or without a row
   size_t planes_asked = 0;  ///< number of planes of their shapes that were evaluated, without pairs that have not moved
@@ -88,6 +91,16 @@ struct Overlaps {
   /// The Overlap of that row, for all other quantities.
   std::shared_ptr<Overlap> overlap(size_t row) const;
   Overlaps select(std::span<const std::int64_t> rows) const;
+  /// The depth and the normal of each row.
+  struct Ways {
+    std::vector<double> depth;
+    std::vector<Vec3> normal;
+  };
+  /// Found on first use for rows that are `deferred`.
+  const std::vector<double>& depths() const;
+  const std::vector<Vec3>& normals() const;
+  /// The normal of a row, without those of other rows.
+  Vec3 normal_of(size_t row) const;
   /// Computed on first use, pair by pair.
   const Patches& patches() const;
   const std::vector<double>& areas() const;
@@ -102,12 +115,15 @@ struct Overlaps {
 
  private:
   Placed placed(int body) const;
+  Penetration way_of(size_t row) const;
+  const Ways& ways() const;
   /// `of` the overlap of each row whose status is `least` or more; zeros elsewhere.
   CentroidGradients of_centroids(Status least, std::vector<CentroidGradient> (*of)(const Overlap&)) const;
 
   template <class T>
   using Shared = std::shared_ptr<Once<T>>;
   Shared<std::vector<double>> areas_ = std::make_shared<Once<std::vector<double>>>();
+  Shared<Ways> ways_ = std::make_shared<Once<Ways>>();
   Shared<Patches> patches_ = std::make_shared<Once<Patches>>();
   Shared<std::vector<ShapeGradients>> shape_gradients_ = std::make_shared<Once<std::vector<ShapeGradients>>>();
   Shared<Gradients> depth_gradients_ = std::make_shared<Once<Gradients>>();
@@ -191,6 +207,9 @@ class Batch {
   std::shared_ptr<const std::vector<Shape>> shapes_;
   std::unique_ptr<Memory> memory_;
   std::shared_ptr<std::atomic<bool>> patches_asked_ = std::make_shared<std::atomic<bool>>(false);
+  /// Depths and normals of the first results, and of results after those whose depths were asked for, are found at
+  /// once.
+  std::shared_ptr<std::atomic<bool>> ways_asked_ = std::make_shared<std::atomic<bool>>(true);
   std::atomic_flag in_use_;
 };
 

@@ -238,8 +238,17 @@ void define_column(nb::class_<Overlaps>& cls, const char* name, Values values, c
 
 template <class T>
 void define_column(nb::class_<Overlaps>& cls, const Column<T>& column) {
-  const auto values = [member = column.values](const Overlaps& overlaps) -> const auto& { return overlaps.*member; };
-  define_column<T>(cls, column.name, values, column.doc);
+  const auto define = [&](auto values) { define_column<T>(cls, column.name, values, column.doc); };
+  const auto lazily = [&](const std::vector<T>& (Overlaps::*find)() const) {
+    define([find](const Overlaps& overlaps) -> const auto& {
+      return unlocked([&]() -> const std::vector<T>& { return (overlaps.*find)(); });
+    });
+  };
+  if constexpr (std::is_same_v<T, double>)
+    if (column.values == &Overlaps::depth) return lazily(&Overlaps::depths);
+  if constexpr (std::is_same_v<T, Vec3>)
+    if (column.values == &Overlaps::normal) return lazily(&Overlaps::normals);
+  define([member = column.values](const Overlaps& overlaps) -> const auto& { return overlaps.*member; });
 }
 
 /// The values of a column that is a member of what an Overlaps computes on first use.

@@ -169,11 +169,14 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
     ElasticPatch& patch = patches[i];
     patch.key = std::int64_t(a) << 32 | b;
     patch.link_a = int(link_of[a]), patch.link_b = int(link_of[b]);
-    patch.normal = seen[i] ? seen[i]->normal : found.normal[i];
+    if (seen[i]) patch.normal = seen[i]->normal;
     patch.stiffness = stiffness[i], patch.dissipation = dissipation[i];
     patch.recovery = recovery[i], patch.restitution = restitution[i];
     patch.friction = friction[i], patch.rolling = rolling[i], patch.spinning = spinning[i];
-    if (found.status[i] != std::int8_t(Status::kOverlapping)) continue;
+    if (found.status[i] != std::int8_t(Status::kOverlapping)) {
+      if (!seen[i]) patch.normal = found.normal_of(i);
+      continue;
+    }
     patch.volume = found.volume[i], patch.force = stiffness[i] * found.volume[i];
     patch.centroid = found.centroid[i];
     const auto& [area, centre, moments, distance] = shared[i];
@@ -181,6 +184,8 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
       patch.area = norm(area);
       patch.normal = unit(area);
       patch.centre = centre, patch.moments = moments, patch.distance = distance;
+    } else if (!seen[i]) {
+      patch.normal = found.normal_of(i);
     }
     if (hardening[i] > 0) harden(patch, hardening[i], found, i);
   }

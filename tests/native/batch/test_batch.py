@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import pickle
 import re
 import signal
 import threading
@@ -438,3 +439,38 @@ def test_patches_are_those_of_new_batches_once_they_were_asked_of_earlier_result
         if step != 1:
             positions, orientations = walk(rng, positions, orientations)
     assert (fresh.volume > 0).any()
+
+
+def test_depths_that_nobody_has_asked_for_are_found_on_first_use():
+    """They have the bits of depths that are found at once, whatever was asked of earlier results."""
+    rng = np.random.default_rng(8)
+    shapes, positions, orientations = scene(rng)
+    batch = Batch(shapes)
+    for step in range(8):
+        found = batch.overlaps(positions, orientations, threads=1 + step % 2)
+        at_once = Batch(shapes).overlaps(positions, orientations)
+        if step % 3:  # else the depths of the next results are deferred
+            assert_array_equal(found.depth, at_once.depth)
+        half = found[np.arange(0, len(found), 2)]
+        for each in (found, pickle.loads(pickle.dumps(found))):
+            assert_array_equal(each.normal, at_once.normal)
+        assert_array_equal(half.depth, at_once.depth[::2])
+        assert_array_equal(half.normal, at_once.normal[::2])
+        positions, orientations = walk(rng, positions, orientations)
+    for row in range(0, len(found), 5):
+        assert found[row].depth == found.depth[row]
+
+
+def test_deferred_depths_of_pairs_that_have_not_moved_are_those_of_before():
+    rng = np.random.default_rng(9)
+    shapes, positions, orientations = scene(rng)
+    batch = Batch(shapes)
+    batch.overlaps(positions, orientations)
+    for _ in range(2):
+        positions, orientations = positions + 1e-3, orientations
+        batch.overlaps(positions, orientations)
+    again = [batch.overlaps(positions, orientations) for _ in range(3)]
+    truth = Batch(shapes).overlaps(positions, orientations)
+    for found in reversed(again):
+        assert_array_equal(found.depth, truth.depth)
+        assert_array_equal(found.normal, truth.normal)
