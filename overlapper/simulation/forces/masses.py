@@ -163,7 +163,7 @@ class Masses:
         Velocities that are not finite are 0. The lost bodies are those that such velocities move.
         """
         velocity = self.dynamics.velocity()
-        if velocity.dot(velocity) < FARTHEST**2 or np.abs(velocity).max() < FARTHEST:
+        if np.abs(velocity).max(initial=0.0) < FARTHEST:
             return velocity, set()
         finite = np.abs(velocity) < FARTHEST
         bodies = self._bodies
