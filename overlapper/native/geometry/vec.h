@@ -30,6 +30,11 @@ inline double norm(Vec3 a) { return std::hypot(a.x, a.y, a.z); }
 /// Component by component.
 inline Vec3 scaled(Vec3 a, Vec3 b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 inline Vec3 abs(Vec3 a) { return {std::abs(a.x), std::abs(a.y), std::abs(a.z)}; }
+/// The sums of the absolute terms of cross(a, b), which may cancel.
+inline Vec3 sizes_of_cross(Vec3 a, Vec3 b) {
+  const Vec3 p = abs(a), q = abs(b);
+  return {p.y * q.z + p.z * q.y, p.z * q.x + p.x * q.z, p.x * q.y + p.y * q.x};
+}
 inline double max_component(Vec3 a) { return std::max({a.x, a.y, a.z}); }
 inline Vec3 min(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
 inline Vec3 max(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }

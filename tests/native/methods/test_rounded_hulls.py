@@ -5,11 +5,12 @@ certificates.
 """
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from overlapper import Box, HalfSpace, Hull, Placed, RoundedHull, overlap
+from overlapper import Box, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
 CUBE_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 TURNS = [(0, 0, 0, 1), (0, 0, 1, 1), (1, 1, 1, 1), (0.1, 0.2, 0.3, 0.4), (1e-9, 0, 0, 1)]
@@ -230,3 +231,41 @@ def test_thin_cores_whose_normals_are_nearly_opposite(thin, radius, other):
     lower, upper = found.certificate().verify()
     assert lower - found.volume_error <= found.volume <= upper + found.volume_error
     assert found.volume_error <= 1e-12 * found.volume
+
+
+@pytest.mark.parametrize("seed", [1, 2, 8, 9, 38])
+def test_thin_cores_across_thin_plates(seed):
+    """Pieces at the edges of the core are needles, far from the axes of their cylinders relative to their width."""
+    for found in (overlap(*crossing_plates(seed)), overlap(*crossing_plates(seed), Placed(Sphere(40)))):
+        lower, upper = found.certificate().verify()
+        assert lower - Fraction(found.volume_error) <= Fraction(found.volume) <= upper + Fraction(found.volume_error)
+        assert found.volume_error <= 1e-11 * found.volume
+
+
+@pytest.mark.parametrize("seed", [86, 135])
+def test_a_body_around_thin_cores_across_thin_plates(seed):
+    for around in (Placed(Sphere(40)), HalfSpace([0, 0, 1], 30)):
+        pair, found = overlap(*crossing_plates(seed)), overlap(*crossing_plates(seed), around)
+        assert abs(pair.volume - found.volume) <= pair.volume_error + found.volume_error
+
+
+@pytest.mark.parametrize("seed", [52, 142, 167, 174, 256])
+def test_ends_of_thin_rods_far_from_the_point_that_pieces_are_placed_about(seed):
+    """Faces at the ends of pieces are no farther than these ends, but for the rounding of their places."""
+    rng = np.random.default_rng(seed)
+    turn = rng.normal(size=4)
+    rod = Placed(RoundedHull(CUBE_CORNERS * [1, 3e-6, 5e-6], 2e-5), (0, 0, 0), turn)
+    other = Placed(RoundedHull(CUBE_CORNERS * [1, 8e-4, 6e-5], 1e-7), 1e-6 * rng.normal(size=3), turn)
+    found = overlap(rod, other)
+    lower, upper = found.certificate().verify()
+    assert lower - Fraction(found.volume_error) <= Fraction(found.volume) <= upper + Fraction(found.volume_error)
+
+
+def crossing_plates(seed):
+    rng = np.random.default_rng(seed)
+    at = rng.normal(size=3)
+    plate = rng.normal(size=(rng.integers(4, 9), 3)) * [1, 1, 10 ** rng.uniform(-8, -6)]
+    core = rng.normal(size=(rng.integers(4, 9), 3)) * [1, 1, 10 ** rng.uniform(-6, -3)]
+    turn = rng.normal(size=4)
+    thin = Placed(RoundedHull(core, rng.uniform(0.2, 1)), at, turn)
+    return thin, Placed(Hull(plate), at + 0.1 * rng.normal(size=3), turn + 0.1 * rng.normal(size=4))

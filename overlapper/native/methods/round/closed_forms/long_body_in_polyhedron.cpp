@@ -31,9 +31,9 @@ struct LongBodySums {
 
 /// Adds the common part of an infinite cylinder and a polyhedron that the planes of the ends have cut. False if this
 /// part is uncertain.
-bool add_middle(const quadric::Rings& part, const Revolved& body, LongBodySums& sums) {
+bool add_middle(const quadric::Rings& part, const Revolved& body, double rounding, LongBodySums& sums) {
   if (part.empty()) return true;
-  const auto middle = quadric::measure_cylinder(part, body.radius);
+  const auto middle = quadric::measure_cylinder(part, body.radius, rounding);
   if (!middle) return false;
   sums.error = middle->error, sums.faces = middle->faces;
   // The cuts are faces of a cylinder; they are inside a capsule.
@@ -71,12 +71,12 @@ bool flush(const quadric::Rings& polyhedron, const Revolved& body) {
 
 /// Sums over the common part of a polyhedron and a cylinder, or a capsule as a cylinder and two half balls. The
 /// polyhedron is in coordinates of the long body. False if a part is uncertain, or there is nothing.
-bool add_all(const quadric::Rings& polyhedron, const Revolved& body, LongBodySums& sums) {
+bool add_all(const quadric::Rings& polyhedron, const Revolved& body, double rounding, LongBodySums& sums) {
   thread_local quadric::Rings part;
   if (flush(polyhedron, body)) return false;
   const double h = body.half_length;
   part = polyhedron;
-  if (!part.cut(h, true) || !part.cut(-h, false) || !add_middle(part, body, sums)) return false;
+  if (!part.cut(h, true) || !part.cut(-h, false) || !add_middle(part, body, rounding, sums)) return false;
   for (const double end : {h, -h}) {
     if (!body.round) break;
     part = polyhedron;
@@ -92,7 +92,7 @@ std::optional<MeasuresAndInertia> long_body_in_polyhedron(const RoundPair& pair)
   const Pose &pose = pair.round_body().pose, &flat = pair.flat_body().pose;
   if (!polyhedron.become(pair.flat_body().shape, relative_pose(pose, flat))) return std::nullopt;
   LongBodySums sums;
-  if (!add_all(polyhedron, *pair.revolved[pair.self], sums)) return std::nullopt;
+  if (!add_all(polyhedron, *pair.revolved[pair.self], pair.rounding, sums)) return std::nullopt;
   Measures q = measures_in_closed_form();
   q.volume = sums.moments.volume, q.area = sums.area, q.facets_touched = sums.faces;
   q.volume_error = sums.error + pair.rounding * q.area;
@@ -116,7 +116,7 @@ bool add_sections_of_long_body(const RoundPair& pair, PatchSums& patch) {
   PatchSums with = patch;
   LongBodySums sums;
   sums.patch = &with, sums.view = quadric::SectionView(patch, pose.translation, pose.rotation, pair.self == 1);
-  if (!add_all(polyhedron, *pair.revolved[pair.self], sums)) return false;
+  if (!add_all(polyhedron, *pair.revolved[pair.self], pair.rounding, sums)) return false;
   if (!(sums.error + pair.rounding * sums.area <= kSureOfSections * sums.moments.volume)) return false;
   patch = with;
   return true;

@@ -24,7 +24,9 @@ struct Settled {
   double misplaced;  ///< m: distance of corners from their faces, beyond rounding
 
   /// The error of the volume of a part by the places of corners.
-  double error(double border) const { return (16 * DBL_EPSILON * polytope.extent() + misplaced) * border; }
+  double error(double border) const { return off() * border; }
+  /// m: error of the places of corners, seen from a point so far from the inner point.
+  double off(double from = 0) const { return 16 * DBL_EPSILON * (polytope.extent() + from) + misplaced; }
 };
 
 /// Negligible rounding, relative to the volume, for a piece with so many faces.
@@ -188,7 +190,7 @@ bool add_cylinder(const Round& cylinder, const Settled& settled, const DistinctW
     rings.add_face({turn * face.normal, face.slack - dot(face.normal, centre)}, ring);
     owners.push_back(distinct.owner_at(face.wall));
   });
-  const auto found = quadric::measure_cylinder(rings, cylinder.radius);
+  const auto found = quadric::measure_cylinder(rings, cylinder.radius, settled.off(norm(centre)));
   if (!found || !(found->volume >= 0)) return false;
   Totals piece;
   static_cast<Moments&>(piece) = *found, piece.error = found->error;

@@ -81,20 +81,22 @@ bool find_chord(Vec3 p, Vec3 q, bool p_inside, bool q_inside, double radius, Cyl
 
 /// Sums over the part of a face inside the cylinder.
 struct FaceSums : Section {
-  double sizes = 0;  ///< m²: the sum of the absolute areas
-  Vec3 within;       ///< ∫ (ρ² − r²) x dA, where ρ is the distance from the axis
-  double cubes = 0;  ///< ∫ z³ dA
+  double sizes = 0;   ///< m²: the sizes of all products whose sum is the area
+  double levers = 0;  ///< m²: twice the areas that the border sweeps over if it moves by its distance from the foot
+  Vec3 within;        ///< ∫ (ρ² − r²) x dA, where ρ is the distance from the axis
+  double cubes = 0;   ///< ∫ z³ dA
 };
 
 /// The polyhedron about the point of the axis at half of its height.
 struct AboutAxis {
   const Rings* polyhedron = nullptr;
   double radius = 0, level = 0, height = 0;
+  double misplaced = 0;  ///< m: rounding of corners and planes
   std::vector<Vec3> corners;
   std::vector<char> inside;
 
-  void become(const Rings& rings, double cylinder_radius) {
-    polyhedron = &rings, radius = cylinder_radius;
+  void become(const Rings& rings, double cylinder_radius, double rounding) {
+    polyhedron = &rings, radius = cylinder_radius, misplaced = rounding;
     corners.assign(rings.corners().begin(), rings.corners().end());
     double low = std::numeric_limits<double>::infinity(), high = -low;
     for (size_t f = 0; f < rings.planes().size(); ++f)
@@ -113,6 +115,7 @@ struct CylinderSums {
   CylinderPart part;
   int terms = 0;
   double cones = 0, sizes = 0, all_area = 0;
+  double levers = 0;               ///< m²: those of all faces
   double upward = 0;               ///< m²: area of faces that look up, seen along the axis
   double far2 = 0;                 ///< m²: largest squared distance of a cut edge's corner from the origin
   double turned = 0;               ///< rad: sum over the arcs
@@ -131,7 +134,7 @@ struct CylinderSums {
     ++part.faces, ++terms;
     cones += offset * area;
     sizes += std::abs(offset) * face.sizes;
-    all_area += area;
+    all_area += area, levers += face.levers;
     upward += std::max(0.0, area * n.z);
     height_moments += offset * face.first;
     radial += n.x * face.within.x + n.y * face.within.y;
@@ -194,9 +197,11 @@ FaceSums add_ellipse(Vec3 n, double offset, double radius, CylinderSums& sums) {
 }
 
 void add_triangle(Vec3 n, Vec3 a, Vec3 b, Vec3 c, double radius, FaceSums& face) {
-  const double area = dot(n, cross(b - a, c - a)) / 2;
+  const Vec3 e = b - a, f = c - a;
+  const double area = dot(n, cross(e, f)) / 2;
+  face.sizes += dot(abs(n), sizes_of_cross(e, f)) / 2;
   if (area == 0) return;
-  face.area += area, face.sizes += std::abs(area);
+  face.area += area;
   const Vec3 sum = a + b + c;
   face.first += area / 3 * sum;
   // A rule for polynomials of the third degree.
@@ -306,15 +311,19 @@ std::optional<FaceSums> add_polygon(Vec3 n, std::span<const CylinderChord> chord
   const Vec3 apex = chords[0].from;
   double border = 0;
   for (const CylinderChord& chord : chords) border += std::sqrt(dot2(chord.to - chord.from, chord.to - chord.from));
+  const Vec3 beside = cross(apex, n);
+  const auto lever = [&](Vec3 from, Vec3 to) { return std::abs(dot(beside, to - from)); };
   for (size_t k = 0; k < chords.size(); ++k) {
     const CylinderChord &chord = chords[k], &next = chords[k + 1 < chords.size() ? k + 1 : 0];
     add_triangle(n, apex, chord.from, chord.to, radius, face);
+    face.levers += lever(chord.from, chord.to);
     if (!chord.to_surface && !next.from_surface) continue;
     if (grazes(n, chord.to, radius) || grazes(n, next.from, radius)) return std::nullopt;
     const auto angle = arc_angle(n, chord.to, next.from, chords, border, radius);
     if (!angle) return std::nullopt;
     add_arc(n, chord.to, next.from, *angle, radius, sums, face);
     add_triangle(n, apex, chord.to, next.from, radius, face);
+    face.levers += lever(chord.to, next.from);
   }
   return face;
 }
@@ -325,7 +334,7 @@ bool add_face(const AboutAxis& at, size_t f, std::vector<CylinderChord>& chords,
   const double offset = at.polyhedron->planes()[f].offset - n.z * at.level;
   // The cylinder between the heights does not reach a plane farther away.
   const double reach = at.radius * std::sqrt(dot2(n, n)) + std::abs(n.z) * at.height / 2;
-  if (offset > reach + kBeyond * (reach + at.radius + std::abs(at.level))) return true;
+  if (offset > reach + kBeyond * (reach + at.radius + std::abs(at.level)) + 2 * at.misplaced) return true;
   const auto ring = at.polyhedron->ring(f);
   find_chords(at, ring, chords, sums);
   if (chords.empty() && !around(at, ring, n)) return true;
@@ -360,7 +369,8 @@ bool finish(const AboutAxis& at, CylinderSums& sums) {
   part.area += curved, part.whole_area = sums.all_area + curved;
   const double reach = std::sqrt(sums.far2) + r;
   part.error = kUnit * (kMostRoundings + sums.terms) * sums.sizes / 3 +
-               kLeaving * reach * (sums.all_area + std::abs(curved) + reach * sums.rims / 3);
+               kLeaving * reach * (sums.all_area + std::abs(curved) + reach * sums.rims / 3) +
+               (kLeaving * reach + at.misplaced) * sums.levers / 3;
   const Vec3 of_curved{r * part.curved.force.x, r * part.curved.force.y, r * sums.squares / 2};
   part.first = 0.25 * (sums.height_moments + r * of_curved);
   const double v = part.volume, both = sums.radial / 4 + r * r * v / 2, rest = (r * r * v - both) / 2;
@@ -403,13 +413,16 @@ struct CylinderScratch {
 // forth as much as back, and faces look up as much as down. An arc in the wrong direction would violate both.
 //
 // Error. Every term has at most kMostRoundings roundings, and every sum adds one. Points are off by kLeaving times the
-// reach of their numbers. The volume between the computed surface and the true one is at most that, times the area. A
+// reach of their numbers. The volume between the computed surface and the true one is at most that, times the area.
+// Points off the plane of a face also tilt its area vector, and h A leaves out the component in the plane. For an edge
+// e, the point p where the triangles of the face meet, and points off by δ, this component is at most δ |e|, and its
+// product with p is at most δ |n · (e × p)|. It is large for a face that is far from the foot of its height. A
 // point off the cylinder also leaves a gap along its arc, between the face and the curved part. The gap is at most as
 // wide as the point is off, and counts with a third of the reach as its height.
-std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius) {
+std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius, double misplaced) {
   const Scratch<CylinderScratch> scratch;
   auto& [at, chords, sections] = *scratch;
-  at.become(polyhedron, radius);
+  at.become(polyhedron, radius, misplaced);
   sections.assign(polyhedron.planes().size(), {});
   CylinderSums sums;
   for (size_t f = 0; f < sections.size(); ++f)

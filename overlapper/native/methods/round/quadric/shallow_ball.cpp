@@ -49,9 +49,9 @@ void ShallowBall::begin_face(Vec3 normal, double height, double disc_radius) {
 }
 
 void ShallowBall::add_chord(Vec3 from, Vec3 to) {
-  const Vec3 n = normal_, turn = cross(from, to), foot = height_ * n;
-  const double twice = dot(n, turn);
-  twice_ += twice, twice_sizes_ += std::abs(n.x * turn.x) + std::abs(n.y * turn.y) + std::abs(n.z * turn.z);
+  const Vec3 n = normal_, foot = height_ * n;
+  const double twice = dot(n, cross(from, to));
+  twice_ += twice, twice_sizes_ += dot(abs(n), sizes_of_cross(from, to));
   const Vec3 sum = from + to + foot;
   face_first_ += twice / 6 * sum;
   if (height_ == 0) return;
