@@ -138,6 +138,26 @@ def test_a_body_around_a_pair_changes_nothing(kinds):
         assert_allclose(group_of_three.gradient[2], 0, atol=1e-12)
 
 
+def flat_but_for_rounding(seed):
+    """A rounded hull with a core that is flat but for rounding, a half-space through its middle, a ball around both."""
+    rng = np.random.default_rng(seed)
+    turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    at = 10 ** rng.uniform(0, 6) * rng.normal(size=3)
+    size = 10 ** rng.uniform(-1, 3)
+    core = size * rng.normal(size=(rng.integers(4, 12), 2)) @ turned[:2] + at
+    body = RoundedHull(core, size * 10 ** rng.uniform(-3, 1))
+    middle = core.mean(0)
+    around = Placed(Sphere(12 * (size + body.radius)), middle)
+    return Placed(body), Placed(HalfSpace(rng.normal(size=3), 0), middle), around
+
+
+def test_balls_between_many_planes_through_one_line():
+    """Rounding puts planes through a corner of a flat core in a wrong order, so that their polytope has a fold."""
+    body, plane, around = flat_but_for_rounding(3004)
+    pair, found = overlap(body, plane), overlap(body, plane, around)
+    assert abs(pair.volume - found.volume) <= pair.volume_error + found.volume_error
+
+
 def test_parallel_cylinders_are_separated_by_a_plane():
     """A prism over the common part of three equal discs about the corners of a triangle (Reuleaux)."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0.5, np.sqrt(0.75), 0]])
