@@ -158,6 +158,25 @@ def test_balls_between_many_planes_through_one_line():
     assert abs(pair.volume - found.volume) <= pair.volume_error + found.volume_error
 
 
+@pytest.mark.parametrize("seed", [324, 3824, 4382])
+def test_wedges_that_are_thinner_than_they_are_tilted(seed):
+    body, plane, around = flat_but_for_rounding(seed)
+    pair, found = overlap(body, plane), overlap(body, plane, around)
+    assert abs(pair.volume - found.volume) <= pair.volume_error + found.volume_error
+
+
+def test_errors_count_edges_that_rounding_has_turned_back():
+    core = [
+        [-228.19018762913493, 168.64895585679642, 49.94688694664977],
+        [208.89060241078056, 91.20957163156146, 241.2532994344141],
+        [-1.5218986605436082, -289.2615215173071, -336.8837252444207],
+        [369.4785276482767, -243.63975097199156, -44.943498982643604],
+        [67.44932784485637, 218.22931835339494, 297.97333844466164],
+        [334.93212040715406, -158.65599274463904, 31.690779149099114],
+    ]
+    assert overlap(RoundedHull(core, 4.745431674454119), HalfSpace([0, 1, 0], -35.6)).volume_error > 0
+
+
 def test_parallel_cylinders_are_separated_by_a_plane():
     """A prism over the common part of three equal discs about the corners of a triangle (Reuleaux)."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0.5, np.sqrt(0.75), 0]])

@@ -89,7 +89,7 @@ bool add_polytope(const Settled& settled, const DistinctWalls& distinct, const P
     PatchSums* patch = of_piece.patch && owner == setting.view.owner ? &*of_piece.patch : nullptr;
     const auto [area, first] = add_tetrahedra(polytope, face, ring, apex, patch, of_piece);
     const Vec3 force = area * face.normal;
-    piece.border += area;
+    piece.border += std::abs(area);
     piece.add_area(owner, area);
     if (owner != slicing::kCut) piece.unbalanced += force;
     if (owner == 0) piece.pull += force, piece.moment += cross(first, face.normal);

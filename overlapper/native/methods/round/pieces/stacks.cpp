@@ -117,7 +117,7 @@ bool sound(const Stack& stack, const Integrals& s, double extent) {
 /// The error of a volume that slices have summed: rounding, and the error of the rules.
 double error_of(const slicing::Sum& sum) {
   const Integrals& s = sum.integrals;
-  return sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
+  return sum.error + s.uneven + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * std::abs(s.volume);
 }
 
 /// Adds a piece by slices about its centroid, if less is missing or uncertain then. The inner point may be at one end

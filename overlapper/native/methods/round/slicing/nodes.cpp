@@ -207,8 +207,9 @@ class Bundle {
       weight[k] = counts;
       x[k] = counts * (0.5 * (px + qx)), y[k] = counts * (0.5 * (py + qy));
       up[k] = t * counts, size[k] = std::abs(t) * counts;
-      blur[k] = counts * (offset + rate * std::abs(t) + nx * std::max(std::abs(px), std::abs(qx)) +
-                          ny * std::max(std::abs(py), std::abs(qy)));
+      // Rounding may move the crossings of nearly parallel lines past each other. Terms have sizes all the same.
+      blur[k] = std::abs(counts) * (offset + rate * std::abs(t) + nx * std::max(std::abs(px), std::abs(qx)) +
+                                    ny * std::max(std::abs(py), std::abs(qy)));
     }
     if (stack_.cuts && line.owner == kCut)
       for (int k = 0; k < kRow; ++k)
@@ -254,8 +255,9 @@ class Bundle {
       up[k] = z, x_up[k] = z * mx, y_up[k] = z * my, t_up[k] = z * t;
       area[k] = counts * radius * inverse;
       size[k] = std::abs(t) * (std::abs(t) + std::abs(level)) * counts * inverse;
-      blur[k] = counts * (std::abs(here[k]) + (far > 0 ? terms / far : 0) + nx * std::max(std::abs(px), std::abs(qx)) +
-                          ny * std::max(std::abs(py), std::abs(qy)));
+      blur[k] =
+          std::abs(counts) * (std::abs(here[k]) + (far > 0 ? terms / far : 0) +
+                              nx * std::max(std::abs(px), std::abs(qx)) + ny * std::max(std::abs(py), std::abs(qy)));
     }
     const double all = sum(weight), mt = sum(along_t), of_side = sum(area);
     sum_.blur += sum(blur);
@@ -559,7 +561,12 @@ void add_face(const Line& plane, const Stack& stack, const Outline& outline, dou
   sum.correction +=
       (plane.offset_tail * area - plane.rate_tail * t * area - tilt.x * face.first.x - tilt.y * face.first.y) /
       std::abs(plane.rate);
-  sum.blur += area * (std::abs(plane.offset) + std::abs(plane.rate * t)) / std::abs(plane.rate);
+  // If the tilts of both ends are u together, they meet where u is more than the thickness h between the ends, and
+  // u − h is at most u² / 4h. For tilts v and w, u² is at most 2 (v² + w²).
+  const Vec3 s = face.squares;
+  const double square = tilt.x * tilt.x * s.x + tilt.y * tilt.y * s.y + 2 * tilt.x * tilt.y * face.products.z;
+  sum.uneven += std::max(0.0, square) / (2 * (stack.high - stack.low) * plane.rate * plane.rate);
+  sum.blur += std::abs(area) * (std::abs(plane.offset) + std::abs(plane.rate * t)) / std::abs(plane.rate);
   const double owned = plane.owner == kCut ? 0 : stack.stretch ? stack.area({0, 0, area}) : area;
   sum.area += owned;
   if (plane.owner == 0) sum.first_area += owned;

@@ -349,6 +349,7 @@ void Integrals::add(double weight, const Integrals& other) {
   terms += weight * other.terms;
   border += weight * other.border, cut_border += weight * other.cut_border;
   correction += weight * other.correction;
+  uneven += weight * other.uneven;
   blur += weight * other.blur;
   for (int i = 0; i < 6; ++i) seen[i] += weight * other.seen[i];
 }

@@ -203,6 +203,7 @@ struct Integrals : Moments {
   double border = 0;             ///< ∫ dA over all of the surface
   double cut_border = 0;         ///< ∫ dA over the cuts through bodies
   double correction = 0;         ///< of the volume: first-order effect of the tails of planes
+  double uneven = 0;             ///< of the volume: bound of the second-order effect of the tilts of end planes
   double blur = 0;               ///< of the volume: the size of the terms in the sums for lines
   std::array<double, 6> seen{};  ///< ∫ 1, u, v, u², uv and v² over the viewed surface
 
