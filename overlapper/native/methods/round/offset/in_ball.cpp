@@ -63,6 +63,7 @@ struct Turns {
 
 struct BallCorner {
   Vec3 apart;                  ///< from the ball's centre to the vertex
+  WideVector exactly;          ///< the same, if `exact`
   double distance = 0;         ///< m, of the vertex
   double slack = 0, near = 0;  ///< R − ρ and ρ at the point of its sphere nearest to the centre
   double far = 0;              ///< R − ρ at the farthest point
@@ -75,6 +76,7 @@ struct BallCorner {
 struct BallFacet {
   double height = 0;           ///< m, of the ball's centre above the facet of the core
   int plane = -1;              ///< number of its plane in double-double
+  WideVector foot;             ///< from the centre; zero if there is no such plane
   double slack = 0, near = 0;  ///< R − ρ and ρ at the point of its moved plane nearest to the centre
   Turns turns;                 ///< of its corners, about the foot of the centre
 };
@@ -87,7 +89,7 @@ struct BallEdge {
   double from = 0, to = 0;     ///< m, along the edge from the foot of the centre
   double depth = 0;            ///< R + r − distance
   double from2 = 0, to2 = 0;   ///< m²: R² − ρ² where the band's lines nearest to the centre end
-  double left = 0, right = 0;  ///< angles ψ of the facets' normals, if `exact`
+  double left = 0, right = 0;  ///< angles ψ of the facets' normals from −π to π, if `exact`
   double off = 1;              ///< rounding of the direction to the centre, in units of `kOfDirections`
   bool exact = false;
 };
@@ -221,11 +223,16 @@ class InBall {
     BallCorner &from = work_.corners[edge.from], &to = work_.corners[edge.to];
     const Vec3 left = surface_.facets[edge.left].normal, right = surface_.facets[edge.right].normal;
     if (Turns& turns = work_.facets[edge.left].turns; work_.facets[edge.left].slack > 0)
-      turns.pass(turns.seen(from.apart), turns.seen(to.apart));
+      turns.pass(seen(from, work_.facets[edge.left]), seen(to, work_.facets[edge.left]));
     if (Turns& turns = work_.facets[edge.right].turns; work_.facets[edge.right].slack > 0)
-      turns.pass(turns.seen(to.apart), turns.seen(from.apart));
+      turns.pass(seen(to, work_.facets[edge.right]), seen(from, work_.facets[edge.right]));
     if (from.slack > 0) from.turns.pass(from.turns.seen(right), from.turns.seen(left));
     if (to.slack > 0) to.turns.pass(to.turns.seen(left), to.turns.seen(right));
+  }
+
+  /// A corner of a facet, from the foot of the centre. If the centre is high above the facet, doubles lose its digits.
+  static Flat seen(const BallCorner& corner, const BallFacet& facet) {
+    return facet.turns.seen(corner.exact ? rounded(corner.exactly - facet.foot) : corner.apart - rounded(facet.foot));
   }
 
   /// Adds the angle of the part from a to b of a line from `first` to `last`, or of the part from b to a of the
@@ -257,7 +264,9 @@ class InBall {
     const double chord2 = edge.depth * (ball + gap);
     if (!(chord2 > 0)) return true;
     const double start = edge.exact ? edge.left : std::atan2(dot(left, k), dot(left, g));
-    const double end = edge.exact ? edge.right : start + own.angle;
+    // From `start` to `end`, or past ±π to `end`.
+    const double end = edge.exact ? edge.right : std::remainder(start + own.angle, 2 * kPi);
+    const bool past = end < start;
     if (work_.facets[own.left].slack > 0)
       if (!add_line(edge, work_.facets[own.left], start, 1, own.from, own.to)) return false;
     if (work_.facets[own.right].slack > 0)
@@ -291,8 +300,7 @@ class InBall {
     End ends[2]{{from, edge.from, edge.from2, -1, edge.from >= 0 ? 1.0 : -1.0, flats(from)},
                 {to, edge.to, edge.to2, 1, edge.to <= 0 ? 1.0 : -1.0, flats(to)}};
     const double widest_sine = std::max(std::abs(std::sin(start / 2)), std::abs(std::sin(end / 2)));
-    if (end < kPi &&
-        std::min(edge.from2, edge.to2) - fourfold * widest_sine * widest_sine > kDeepInBall * ball * ball) {
+    if (!past && std::min(edge.from2, edge.to2) - fourfold * widest_sine * widest_sine > kDeepInBall * ball * ball) {
       // The whole band is deep in the ball. χ = ψ/2, and no chord is needed.
       const double low = start / 2, high = end / 2;
       const double surface = fourfold > 0 ? std::asinh(std::abs(gap) / std::sqrt(fourfold)) : kFarthestPole;
@@ -319,12 +327,14 @@ class InBall {
       area_ += r * own.angle * own.length;
       return true;
     }
-    for (const double turned : {0.0, 2 * kPi}) {
-      const double first = std::max(start - turned, -kPi), last = std::min(end - turned, kPi);
-      if (!(first < last)) continue;
+    for (const bool again : {false, true}) {
+      const double first = again ? -kPi : start, last = past && !again ? kPi : end;
+      if ((again && !past) || !(first < last)) continue;
       const double low = of_psi(first), high = of_psi(last);
       if (!(low < high)) continue;
-      const bool from_left = turned == 0, to_right = end - turned <= kPi;
+      // Where the cylinder has no chord, the arc ends before the facet's normal.
+      const auto has_chord = [&](double psi) { return ratio >= 1 || std::abs(std::sin(psi / 2)) < kappa; };
+      const bool from_left = !again && has_chord(first), to_right = again == past && has_chord(last);
       const auto slope = [&](double cosine, double other) {
         return ratio < 1 ? 2 * kappa * cosine / std::sqrt(other) : 2.0;
       };
@@ -502,8 +512,8 @@ class InBall {
     const Vec3 in_plane = side * cross(surface_.facets[number].normal, e);
     const Flat along = facet.turns.seen(e), inwards = facet.turns.seen(in_plane);
     const auto at = [&](double t) { return Flat{t * along.x - inner * inwards.x, t * along.y - inner * inwards.y}; };
-    const Flat flat_first = facet.turns.seen(work_.corners[side > 0 ? first : last].apart);
-    const Flat flat_last = facet.turns.seen(work_.corners[side > 0 ? last : first].apart);
+    const Flat flat_first = seen(work_.corners[side > 0 ? first : last], facet);
+    const Flat flat_last = seen(work_.corners[side > 0 ? last : first], facet);
     add_part(facet.turns, side, low > edge.from ? at(low) : flat_first, high < edge.to ? at(high) : flat_last,
              flat_first, flat_last);
     const Integral integral({0, std::sqrt(q2)}, {0, std::sqrt(q2)});
@@ -591,23 +601,17 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
   const Scratch<BallWork> work;
   work->corners.assign(hull.vertices.size(), {}), work->facets.assign(hull.planes.size(), {}), work->edges.clear(),
       work->planes.clear();
-  double nearest = kInfinity, farthest = 0, size2 = 0;  // distances of the core, and its size, squared
+  double nearest = kInfinity, farthest = 0;  // distances of the core
   for (size_t v = 0; v < hull.vertices.size(); ++v) {
     BallCorner& corner = work->corners[v];
     corner.apart = hull.vertices[v] - centre, corner.distance = std::sqrt(norm2(corner.apart));
     nearest = std::min(nearest, corner.distance), farthest = std::max(farthest, corner.distance);
-    size2 = std::max(size2, norm2(hull.vertices[v]));
   }
   const double whole_ball = 4.0 / 3.0 * kPi * radius * radius * radius;
   if (farthest + r <= radius) {
     const double whole = surface.volume(r);
     return VolumeAlone{whole, kOfTermsInBall * whole};
   }
-  // Integrals lose more digits than their error tells where a ball is tiny or huge beside the core, where its centre is
-  // beside a vertex, and where the contact is shallow relative to a radius. There slices answer.
-  constexpr double kTiny = 1e-3, kHuge = 1e3, kBeside = 1e-4, kShallow = 1e-2;
-  const double smaller = std::min(r, radius), size = std::sqrt(size2);
-  if (smaller < kTiny * size || std::max(r, radius) > kHuge * size || nearest < kBeside * smaller) return std::nullopt;
   double off = wide_placing(apart + norm(hull.origin) + reach(rounded_hull.shape), turned);
   double highest = -kInfinity;
   int highest_facet = 0;
@@ -645,7 +649,7 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
   if (highest > 0 && std::abs(nearest - r) <= doubtful) return std::nullopt;
   const bool inside = highest <= 0 || nearest < r;
   const double depth = inside ? radius : sum - nearest;
-  if (depth < kShallow * smaller) return std::nullopt;
+  if (!(depth > 0)) return std::nullopt;
 
   // In a shallow contact, depths are taken in double-doubles.
   constexpr double kSure = 0x1p-45;
@@ -657,6 +661,7 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
       facet.plane = static_cast<int>(work->planes.size());
       work->planes.push_back(exact_plane(hull, f));
       const DoubleDouble height = signed_distance(work->planes.back(), exactly);
+      facet.foot = -height * work->planes.back().normal;
       facet.height = height.head, facet.slack = (DoubleDouble{radius} - abs(height - DoubleDouble{r})).head;
     }
     facet.near = radius - facet.slack;
@@ -675,16 +680,17 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
     const Vec3 a = hull.vertices[own.from], b = hull.vertices[own.to];
     const WideVector to_a = wide(a) - exactly, to_b = wide(b) - exactly, along = unit(wide_difference(b, a));
     const DoubleDouble first = dot(to_a, along), last = dot(to_b, along);
-    const DoubleDouble near2 = dot(to_a, to_a), far2 = dot(to_b, to_b), line = sqrt(near2 - first * first);
+    const WideVector across = to_a - first * along;
+    const DoubleDouble line = norm(across);
     const DoubleDouble both = DoubleDouble{radius} + DoubleDouble{r};
     const DoubleDouble deep = both - line;
     const DoubleDouble chord2 = deep * (DoubleDouble{radius} - DoubleDouble{r} + line);
     edge.distance = line.head, edge.depth = deep.head, edge.from = first.head, edge.to = last.head;
     edge.from2 = (chord2 - first * first).head, edge.to2 = (chord2 - last * last).head;
     edge.exact = true;
-    // The line of the edge loses 2^-98 of its distance from the ends, squared, over its distance from the centre.
-    const double slant = std::max(from.distance, to.distance) / edge.distance;
-    edge.off = std::max(1.0, 0x1p-48 * slant * slant);
+    if (edge.distance > 0) edge.to_centre = unit(-rounded(across));
+    // The line of the edge loses 2^-98 of the distance of the ends.
+    edge.off = std::max(1.0, 0x1p-48 * std::max(from.distance, to.distance) / edge.distance);
     const auto angle_of = [&](int f) {
       const BallFacet& facet = work->facets[f];
       if (facet.plane < 0) {
@@ -693,12 +699,14 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
       }
       return std::atan2(-dot(cross(work->planes[facet.plane].normal, along), to_a).head, facet.height);
     };
+    // Both keep their digits. If rounding makes the right one the first one, there is no band.
     edge.left = angle_of(own.left), edge.right = angle_of(own.right);
-    edge.right = edge.left + std::max(0.0, std::remainder(edge.right - edge.left, 2 * kPi));
-    for (const auto& [corner, square] : {std::pair{&from, near2}, std::pair{&to, far2}})
+    if (!(std::remainder(edge.right - edge.left, 2 * kPi) > 0)) edge.right = edge.left;
+    for (const auto& [corner, to_it] : {std::pair{&from, to_a}, std::pair{&to, to_b}})
       if (!corner->exact) {
-        const DoubleDouble distance = sqrt(square);
-        corner->exact = true, corner->distance = distance.head;
+        const DoubleDouble distance = norm(to_it);
+        corner->exact = true, corner->exactly = to_it, corner->apart = rounded(to_it);
+        corner->distance = distance.head;
         corner->slack = (DoubleDouble{radius} - abs(distance - DoubleDouble{r})).head;
       }
   }
