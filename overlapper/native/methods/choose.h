@@ -46,7 +46,7 @@ struct Choice {
 
 /// The choice of ways. The first line that fits counts, for single calls, batches and groups alike. Limits for facets
 /// and errors are in geometry/thresholds.h.
-inline constexpr std::array<Choice, 9> kChoices{{
+inline constexpr std::array<Choice, 10> kChoices{{
     {"two boxes or hulls of many facets",
      [](const Traits& t) { return t.many_facet_pairs && t.clippable; },
      {Way::kTracing, Way::kClipping, Way::kWideClipping, Way::kDual}},
@@ -62,7 +62,10 @@ inline constexpr std::array<Choice, 9> kChoices{{
     {"an ellipsoid, and a box, a hull or a half-space",
      [](const Traits& t) { return t.bodies == 2 && t.stretched && t.flat; },
      {Way::kClosedForm, Way::kSlicing, Way::kDual}},
-    {"an ellipsoid, and a round body",
+    {"an ellipsoid and a rounded hull",
+     [](const Traits& t) { return t.bodies == 2 && t.stretched && t.rounded && !t.other; },
+     {Way::kClosedForm, Way::kSlicing, Way::kDual}},
+    {"an ellipsoid, and another round body",
      [](const Traits& t) { return t.bodies == 2 && t.stretched && !t.other; },
      {Way::kSlicing, Way::kDual}},
     {"two, one of them a rounded hull, and no ellipsoid",

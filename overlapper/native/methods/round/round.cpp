@@ -4,6 +4,7 @@
 
 #include "geometry/rounding.h"
 #include "methods/round/offset/in_ball.h"
+#include "methods/round/offset/in_ellipsoid.h"
 #include "methods/round/offset/in_polytope.h"
 #include "methods/round/offset/two_rounded.h"
 
@@ -55,6 +56,7 @@ std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b, c
   const bool first = rounded_hull(a.shape);
   const Placed &rounded = first ? a : b, &other = first ? b : a;
   if (!rounded_hull(rounded.shape)) return std::nullopt;
+  if (stretched(other.shape)) return offset::volume_in_ellipsoid(rounded, other);
   if (!smooth(other.shape)) return offset::volume_in_polytope(rounded, other);
   if (rounded_hull(other.shape)) return offset::volume_of_two_rounded(rounded, other, between);
   const auto revolved = revolution(other.shape);
