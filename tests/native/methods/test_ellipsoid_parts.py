@@ -83,8 +83,8 @@ def test_a_flat_face_cuts_the_same_cap_as_a_half_space(shape, depth):
         low = farthest(ellipsoid, rotation(quaternion / np.linalg.norm(quaternion)), np.array([0, 0, -1.0]))
         a = Placed(ellipsoid, np.array([0, 0, face - depth]) - low, quaternion)
         found, cap = overlap(a, Placed(shape)), overlap(a, HalfSpace([0, 0, 1], face))
-        assert found.volume == pytest.approx(cap.volume, rel=1e-13, abs=0)
-        assert found.volume_error <= 1e-13 * found.volume
+        assert abs(found.volume - cap.volume) <= found.volume_error + cap.volume_error
+        assert found.volume_error <= (1e-13 if isinstance(shape, Cylinder) else 1e-12) * found.volume
         assert (np.abs(found.gradient - cap.gradient) <= found.errors.gradient + cap.errors.gradient).all()
         assert found.area == pytest.approx(cap.area, rel=1e-9, abs=0)
         assert np.allclose(found.centroid, cap.centroid, atol=1e-14)
@@ -140,7 +140,7 @@ def test_gradients_are_the_differences_of_volumes(name):
     a = Placed(Ellipsoid([0.5, 0.8, 0.6]), (0.5, 0.2, 0.4), (1, 2, -1, 2))
     b = Placed(shape, (0, 0, 0), (0.3, 0.1, 0.2, 1))
     found = overlap(a, b)
-    assert found.way == "slicing"
+    assert found.way == ("closed form" if name == "rounded hull" else "slicing")
     step = 1e-3
 
     def by(body, way):
@@ -165,7 +165,7 @@ def test_all_measures_of_an_almost_round_ellipsoid_are_those_of_a_ball(name):
     for off in (1e-9,) if name == "rounded hull" else (2**-52, 1e-12):
         almost = overlap(Placed(Ellipsoid([0.5, 0.5, 0.5 * (1 + off)]), (0.4, 0.2, 0.4)), b)
         ball = overlap(Placed(Sphere(0.5), (0.4, 0.2, 0.4)), b)
-        assert almost.way == "slicing"
+        assert almost.way == ("closed form" if name == "rounded hull" else "slicing")
         assert almost.volume == pytest.approx(ball.volume, rel=10 * off + 1e-12)
         assert almost.area == pytest.approx(ball.area, rel=10 * off + 1e-10)
         assert np.allclose(almost.centroid, ball.centroid, atol=10 * off + 1e-11)
@@ -197,7 +197,7 @@ def test_a_rounded_hull_lies_between_its_core_and_a_larger_hull():
         position, quaternion = rng.normal(size=3) * 0.2, rng.normal(size=4)
         found = [overlap(a, Placed(RoundedHull(points, r), position, quaternion)) for r in (1e-3, 0.05, 0.051)]
         core = overlap(a, Placed(Hull(points), position, quaternion))
-        assert [f.way for f in found] == ["slicing"] * 3, seed
+        assert [f.way for f in found] == ["closed form"] * 3, seed
         assert found[0].volume - core.volume == pytest.approx(1e-3 * (found[0].area + core.area) / 2, rel=1)
         assert core.volume < found[0].volume < found[1].volume < found[2].volume
 
@@ -239,7 +239,6 @@ def test_meshes_of_more_facets_than_a_slice_can_have_are_cut_in_parts(away):
         at = body.position + away * np.array([0.6, 0, 0.8])
         almost = Ellipsoid([0.45, 0.45, 0.45 * (1 + 4e-16)])  # measured as an ellipsoid, though it is a ball
         found, truth = overlap(body, Placed(almost, at)), overlap(body, Placed(Sphere(0.45), at))
-        assert found.way == "slicing"
         assert abs(found.volume - truth.volume) <= found.volume_error + truth.volume_error + 1e-15
         assert found.volume_error <= 1e-11 * found.volume
         assert np.allclose(found.centroid, truth.centroid, atol=1e-12)
@@ -266,4 +265,5 @@ def test_a_corner_of_many_facets_is_sliced():
     pyramid = Placed(RoundedHull(np.vstack([ring, [0, 0, 0.3]]), 1e-3), (0, 0, 0), (1, 2, 3, 4))
     ellipsoid = Placed(Ellipsoid([0.3, 0.5, 0.4]), 0.3 * rotation(pyramid.orientation)[:, 2], (0.3, 0.1, -0.2, 1))
     found = overlap(pyramid, ellipsoid)
-    assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume
+    assert found.errors.area <= 1e-8 * found.area
+    assert found.way == "closed form" and found.volume_error <= 1e-12 * found.volume

@@ -122,7 +122,7 @@ WITH_A_ROUNDED_HULL = {
     "ball": (Sphere(0.5), "closed form"),
     "capsule": (Capsule(0.3, 1.0), "closed form"),
     "cylinder": (Cylinder(0.3, 1.0), "slicing"),
-    "ellipsoid": (Ellipsoid([0.3, 0.4, 0.5]), "slicing"),
+    "ellipsoid": (Ellipsoid([0.3, 0.4, 0.5]), "closed form"),
     "rounded hull": (RoundedHull([[-1, -1, -1], [1, -1, -1], [0, 1, -1], [0, 0, 1]], 0.1), "closed form"),
 }
 
