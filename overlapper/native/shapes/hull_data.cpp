@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cfloat>
 #include <numeric>
+#include <optional>
 #include <string>
 
 #include "geometry/cancellation.h"
@@ -163,10 +164,39 @@ Lists region_loops(const CoplanarRegions& regions) {
   return loops;
 }
 
-/// A point inside an edge lies on two facets only: it is not a vertex of the solid.
-void drop_edge_points(Lists& loops, int points) {
+std::vector<int> facets_at_points(const Lists& loops, size_t points) {
   std::vector<int> facets_at(points, 0);
   for (int v : loops.number) ++facets_at[v];
+  return facets_at;
+}
+
+/// True if two regions meet at a sharp edge that bends. They are flat to rounding, so a corner of the edge may be far
+/// from the line of its neighbours, but only these two regions meet there.
+bool bends_sharp_edges(const CoplanarRegions& regions, const Lists& loops) {
+  const std::vector<int> facets_at = facets_at_points(loops, regions.hull.points.size());
+  std::vector<int> other(regions.hull.points.size(), -1);  // the first region at a point
+  for (int r = 0; r < loops.size(); ++r) {
+    cancellation_point();
+    const auto loop = loops[r];
+    for (size_t i = 0; i < loop.size(); ++i) {
+      const int v = loop[i];
+      if (facets_at[v] != 2) continue;
+      if (other[v] < 0) {
+        other[v] = r;
+        continue;
+      }
+      if (dot(regions.normal[regions.first[r]], regions.normal[regions.first[other[v]]]) >= 0) continue;
+      const auto point = [&](size_t k) { return regions.hull.points[loop[k % loop.size()]]; };
+      const Vec3 before = point(i + loop.size() - 1), along = point(i + 1) - before;
+      if (norm(cross(along, point(i) - before)) > 4 * regions.rounding * norm(along)) return true;
+    }
+  }
+  return false;
+}
+
+/// A point inside an edge lies on two facets only: it is not a vertex of the solid.
+void drop_edge_points(Lists& loops, int points) {
+  const std::vector<int> facets_at = facets_at_points(loops, points);
   int kept = 0;
   for (int i = 0, from = 0; i < loops.size(); ++i) {
     cancellation_point();
@@ -380,10 +410,14 @@ std::shared_ptr<HullData> merged(const ExpandingHull& hull, Vec3 origin, std::ve
   // Corners that a user computes as centre plus rotated half extents have a few roundings each, relative to the extent.
   // A plane through three corners misses a fourth by up to about eight roundings.
   const double rounding = 16 * DBL_EPSILON * extent;
-  const CoplanarRegions regions = merge_coplanar(hull, rounding);
-  Lists loops = region_loops(regions);
+  std::optional<CoplanarRegions> regions(merge_coplanar(hull, rounding));
+  Lists loops = region_loops(*regions);
+  if (bends_sharp_edges(*regions, loops)) {
+    regions.emplace(merge_coplanar(hull, 0));
+    loops = region_loops(*regions);
+  }
   drop_edge_points(loops, static_cast<int>(hull.points.size()));
-  auto data = std::make_shared<HullData>(hull_data(regions, loops, origin, source));
+  auto data = std::make_shared<HullData>(hull_data(*regions, loops, origin, source));
   if (data->planes.size() < 4) return nullptr;
   const HullMeasures measures = measure(*data);
   data->volume = measures.volume;

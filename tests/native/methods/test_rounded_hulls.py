@@ -269,3 +269,19 @@ def crossing_plates(seed):
     turn = rng.normal(size=4)
     thin = Placed(RoundedHull(core, rng.uniform(0.2, 1)), at, turn)
     return thin, Placed(Hull(plate), at + 0.1 * rng.normal(size=3), turn + 0.1 * rng.normal(size=4))
+
+
+def test_a_core_that_is_flat_to_rounding_keeps_corners_where_only_two_facets_meet():
+    """Between top and bottom, such a corner may be far from the line of its neighbours."""
+    corners = [
+        [-228.19018762913493, 168.64895585679642, 49.94688694664977],
+        [208.89060241078056, 91.20957163156146, 241.2532994344141],
+        [-1.5218986605436082, -289.2615215173071, -336.8837252444207],
+        [369.4785276482767, -243.63975097199156, -44.943498982643604],
+        [67.44932784485637, 218.22931835339494, 297.97333844466164],
+        [334.93212040715406, -158.65599274463904, 31.690779149099114],
+    ]
+    assert len(Hull(corners).vertices) == 6
+    found = overlap(RoundedHull(corners, 4.745431674454119), HalfSpace([0, 1, 0], -35.5782))
+    lower, upper = found.certificate().verify()
+    assert lower - Fraction(found.volume_error) <= Fraction(found.volume) <= upper + Fraction(found.volume_error)
