@@ -33,17 +33,18 @@ struct Share {
   double length = 0;  ///< m
   Vec3 places;        ///< m: ∫ of the place from the point; seen
   double off = 0;     ///< m²: ∫ of the distance from the point
+  double doubt = 0;   ///< m³: what rounding of its direction, and gaps of it, may add to three times the cones
 
   Share& operator+=(const Share& other) {
     value += other.value, size += other.size, area += other.area, force += other.force;
-    length += other.length, places += other.places, off += other.off;
+    length += other.length, places += other.places, off += other.off, doubt += other.doubt;
     return *this;
   }
 };
 Share operator*(double factor, const Share& s) {
   const double positive = std::abs(factor);
-  return {factor * s.value,    positive * s.size,   factor * s.area, factor * s.force,
-          positive * s.length, positive * s.places, positive * s.off};
+  return {factor * s.value,    positive * s.size,   factor * s.area,  factor * s.force,
+          positive * s.length, positive * s.places, positive * s.off, positive * s.doubt};
 }
 
 /// The cones from a point over a part of a unit sphere, as an integral along the border of the part. Directions are u,
@@ -71,6 +72,12 @@ struct Pole {
     constexpr double kNearOpposite = 0.25;
     if (beyond < kNearOpposite) share.size += std::abs(angle) / beyond;
     return share;
+  }
+  /// The most that a piece of border adds, for its length.
+  double lever(Vec3 apart) const {
+    const double apart2 = norm2(apart), divisor = 1 / std::abs(2 - apart2 / 2);
+    const double height = over ? (std::abs(slack) + length / 4 * apart2) * divisor : divisor + norm(point) / 2;
+    return std::sqrt(apart2) * height;
   }
 };
 
@@ -199,6 +206,11 @@ void divide(Quartic& polynomial, double root) {
     polynomial[i] = carried, carried = next;
   }
 }
+
+/// Sizes of the terms of an excess, and of half its derivative along a border.
+struct Sizes {
+  double excess = 0, slope = 0;
+};
 
 /// A vector as a polynomial of degree 2.
 struct VectorSquare {
@@ -382,6 +394,10 @@ class InStretched {
     share.off = share.length * std::sqrt(norm2(scaled(h_, from_point)));
     return share;
   }
+  /// What a piece of the ball's border may add; its length is seen.
+  double ball_doubt(Vec3 from_point, double length) const {
+    return abc_ * ball_.lever(from_point + from_pole_) * length;
+  }
   /// A part of the border of a vertex's part of its sphere.
   Share corner_share(const StretchedCorner& corner, Vec3 apart, Vec3 slope) const {
     Share share = corner.pole.along(apart, slope);
@@ -517,6 +533,37 @@ class InStretched {
       if (to_before >= 0) divide(rest, begin - to_before);
       if (to_after >= 0) divide(rest, end + to_after);
       const double sign = to_after >= 0 ? -1.0 : 1.0;
+      // Sizes of the terms of a place, and of the excess there: its rounding moves the place along the line of the
+      // band, by more if that line meets the ellipsoid at a small angle.
+      const double size0 = norm(p.p0), size1 = norm(p.p1), size2 = norm(p.p2), length = std::sqrt(a2);
+      const double from_centre = norm(point_) + norm(from.seen);
+      const auto sizes_of = [&](double t, double at) {
+        const double scale = 1 / (1 + t * t), once = std::abs(t), along_line = std::abs(at);
+        const double places = scale * (size0 + once * (size1 + once * size2)) + along_line * length;
+        const double turning = scale * (size1 + 2 * once * (size2 + size0)) + 2 * once * along_line * length;
+        Sizes sizes;
+        if (wide_ && by_slack) {
+          const double heights = scale * (std::abs(y[0]) + once * (std::abs(y[1]) + once * std::abs(y[2])));
+          const double heights_turning = scale * (std::abs(y[1]) + 2 * once * (std::abs(y[0]) + std::abs(y[2])));
+          sizes.excess = places * places + 2 * (heights + along_line * std::abs(slant)) + std::abs(excess_);
+          sizes.slope = places * turning + heights_turning + once * (along_line * std::abs(slant) + std::abs(excess_));
+        } else {
+          const double all = places + from_centre;
+          sizes.excess = all * all + 1, sizes.slope = all * (turning + once);
+        }
+        return sizes;
+      };
+      const auto add_gap = [&](double t, bool tangent_here) {
+        if (tangent_here) return;
+        const double scale = 1 / (1 + t * t), pa = scale * slicing::value(along, t);
+        const double root = scale * std::sqrt(std::max(0.0, slicing::value(chord, t)));
+        for (const bool is_last : {false, true}) {
+          if (is_last ? to_in : from_in) continue;
+          const double at = ((is_last ? root : -root) - pa) / a2, rounding = kOfPlaces * sizes_of(t, at).excess;
+          const double gap = std::min(rounding / root, std::sqrt(rounding / a2));
+          sum_.total.doubt += ball_doubt(scale * p.at(t) + at * a, gap * length);
+        }
+      };
       const std::array<double, 4> half_slope{q[1] / 2, q[2], 3 * q[3] / 2, 2 * q[4]};
       const auto f = [&](double t, double before, double after) {
         const double scale = 1 / (1 + t * t), sine = 2 * t * scale, cosine = (1 - t) * (1 + t) * scale;
@@ -541,7 +588,9 @@ class InStretched {
           const double rise = slicing::value(half_slope, t) +
                               at * (2 * t * slicing::value(along, t) + (1 + t * t) * (along[1] + 2 * t * along[2])) +
                               2 * a2 * at * at * t * (1 + t * t);
-          return ball_share(z, turning - scale * scale * rise / signed_root * a);
+          Share border = ball_share(z, turning - scale * scale * rise / signed_root * a);
+          if (root > 0) border.doubt = ball_doubt(z, kOfPlaces * scale * sizes_of(t, at).slope / root * length);
+          return border;
         };
         if (!from_in) {
           share += -1.0 * on_line(first, -root);
@@ -556,6 +605,7 @@ class InStretched {
         return share;
       };
       if (!integrate_roots(begin, end, to_before, to_after, f, sum_)) return false;
+      add_gap(begin, to_before == 0), add_gap(end, to_after == 0);
     }
     return true;
   }
@@ -615,6 +665,8 @@ class InStretched {
     const auto use = [&] {
       slope_ = std::max(slope_, std::sqrt(norm2(beside))), height_ = std::max(height_, std::abs(height));
     };
+    const Vec3 foot = above * normal;
+    const double of_inside = std::abs(excess_) + std::abs(above) * (std::abs(above) + 2 * norm(point_));
     double area = 0;
     bool around = true, any = false;
     auto& ends = work_.ends;
@@ -639,13 +691,22 @@ class InStretched {
         const Flat2 first = in ? p : base + (along < 0 ? base_out / (root - along) : -(along + root) / d2) * d;
         const Flat2 last = stays ? q : base + (along < 0 ? (root - along) / d2 : -base_out / (along + root)) * d;
         area += cross(first, last) / 2;
-        if (!in) ends.push_back({first, false});
-        if (!stays) ends.push_back({last, true});
+        const auto add_end = [&](Flat2 at, bool leaves) {
+          ends.push_back({at, leaves});
+          // Rounding of the excess moves an end along its side.
+          const double all = std::sqrt(norm2(at) + above * above), to_at = std::abs(dot(beside, at));
+          const double within = all + norm(point_) + norm(work_.corners[v].seen);
+          const double terms = wide_ ? norm2(at) + 2 * to_at + of_inside : within * within + 1;
+          const double rounding = kOfPlaces * terms;
+          const double gap = std::min(rounding * std::sqrt(d2) / root, std::sqrt(rounding));
+          sum_.total.doubt += ball_doubt(foot + (at.x * x + at.y * y), gap);
+        };
+        if (!in) add_end(first, false);
+        if (!stays) add_end(last, true);
       }
       from = to, p_out = q_out;
     }
     const double to_area = abc_ / size;
-    const Vec3 foot = above * normal;
     // An arc of the disc's border, where the facet is on the left and the ball's part on the right.
     const auto add_arc = [&](Flat2 begin, double angle) {
       crossed_ = true;
@@ -779,6 +840,9 @@ class InStretched {
     std::ranges::sort(crossings, [](const Crossing& a, const Crossing& b) {
       return a.loop != b.loop ? a.loop < b.loop : a.place < b.place;
     });
+    // Sizes of the terms of the gradient: their sum is small if surfaces meet at a small angle.
+    const double terms = 2 * (norm(of_base) + norm(to_base) * k_.z + k_.z * k_.z);
+    const double terms_aside = 2 * (wide_ && corner.pole.over ? norm(aside) : norm(to_base) * k_.z + k_.y * k_.y);
     size_t next = 0;
     for (int i = 0; i < count; ++i) {
       const Loop& loop = loops[i];
@@ -789,11 +853,18 @@ class InStretched {
         const double root = half * std::sin(angle) * std::sqrt(std::max(0.0, rest)) + slicing::value(turned, s);
         return s * n + ((-a * b + root * side) / slope) * p + ((-a * side - root * b) / slope) * m;
       };
+      const auto doubt = [&](Vec3 w, double length) {
+        return r_ * r_ * r_ * corner.pole.lever(w) * length + ball_doubt(corner.base + scaled(k_, w), k_.z * length);
+      };
       const auto of_line = [&](double angle) {
-        const double s = middle - half * std::cos(angle), rest = slicing::value(loop.rest, s);
-        const Vec3 w = apart(angle), slope = across_gradient(w) / std::sqrt(std::max(0.0, rest));
+        const double s = middle - half * std::cos(angle), root = std::sqrt(std::max(0.0, slicing::value(loop.rest, s)));
+        const Vec3 w = apart(angle), slope = across_gradient(w) / root;
         Share share = corner_share(corner, w, slope);
         share += -1.0 * ball_share(corner.base + scaled(k_, w), scaled(k_, slope));
+        const double away = norm(w);
+        const double rounding = kOfPlaces * (terms * away * (1 + away) + terms_aside) / root;
+        // The derivative of s is known, too.
+        share.doubt = doubt(w, rounding + std::abs(dot(n, slope) - half * std::sin(angle)));
         return share;
       };
       const auto add = [&](double begin, double end) {
@@ -811,6 +882,8 @@ class InStretched {
       const size_t begin = next;
       while (next < crossings.size() && crossings[next].loop == i) ++next;
       const auto on_loop = crossings.subspan(begin, next - begin);
+      for (const Crossing& crossing : on_loop)
+        sum_.total.doubt += doubt(crossing.apart, norm(apart(crossing.place) - crossing.apart));
       if (on_loop.empty()) {
         // The whole loop is in the vertex's part of the sphere, or nothing of it.
         double surest = 0;
@@ -947,7 +1020,7 @@ std::optional<VolumeAlone> volume_in_ellipsoid(const Placed& rounded_hull, const
     if (!roughly) {
       // A gap in the surface leaves area vectors open, beyond the rounding of their own sum.
       const double open = norm(total.force), rounding = kOfTermsInEllipsoid * to_border * total.length;
-      const double error = (part.sum().error + kOfTermsInEllipsoid * total.size) / 3 + of_places +
+      const double error = (part.sum().error + kOfTermsInEllipsoid * total.size + total.doubt) / 3 + of_places +
                            2 * std::max(0.0, open - rounding) * to_border;
       constexpr double kOpen = 1e-10;
       if (volume > 0 && std::isfinite(volume) && error <= kEnough * volume && open <= kOpen * total.area)
