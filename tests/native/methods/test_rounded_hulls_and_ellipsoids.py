@@ -185,6 +185,52 @@ def test_stated_errors_hold_against_recorded_slices(kind):
     assert answered >= len(rows) / 3
 
 
+# Margins, half sizes of boxes, half axes, turns of both, and volumes and errors by slices. Centres agree. Surfaces meet
+# at small angles all along the line in which they cross.
+NEARLY_TANGENT = [
+    (0.5, (1, 1.2447906194840095e-06, 0.006862380488718443),
+     (1.7983644964109975, 1.3913477526040021, 1.261338629814628),
+     (0, 0.7071067811865475, 0, 0.7071067811865475), UNTURNED, 1.9453732133331003, 5.05e-13),
+    (0.5, (1, 0.001157212636906448, 0.0001013653310226055), (2, 0.5, 0.5),
+     (1, 1, 1, 1), (1, 1, 1, 1), 1.8621152443661588, 4.36e-13),
+    (2775680.340818898, (0.5, 0.25, 0.5), (2775762.89000068, 2775691.9919824707, 2775642.751280174),
+     UNTURNED, UNTURNED, 8.957663586408237e+19, 20300000),
+    (519469.00795347814, (1, 0.003949530580834979, 0.0034799394292701195),
+     (519355.8781106188, 519415.0034840787, 519520.6825446833),
+     (0, 0.6, 0, 0.8), UNTURNED, 5.870265699230472e+17, 133000),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", NEARLY_TANGENT)
+def test_where_surfaces_nearly_touch_all_along_a_line_errors_hold(case):
+    r, half, axes, turn, turn_of_ellipsoid, volume, error = case
+    found = overlap(rounded_box(r, half, turn=turn), Placed(Ellipsoid(axes), (0, 0, 0), turn_of_ellipsoid))
+    assert abs(found.volume - volume) <= found.volume_error + error
+
+
+@pytest.mark.parametrize("along", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("turn", TURNS)
+def test_a_tip_on_the_axis_of_an_ellipsoid_of_revolution_crosses_in_a_circle(turn, along):
+    """The circle around the tip lies in a plane across the axis."""
+    tips = np.array([(0, 0, 3), (1, 0, 0), (0, 1, 0), (0, 0, -3), (-1, 0, 0), (0, -1, 0)], float)
+    body, ellipsoid = RoundedHull(tips, 6.075), Ellipsoid([6.0377, 6.0377, 12.0754])
+    found = overlap(Placed(body, (0, 0, 0), turn), Placed(ellipsoid, rotation(turn) @ [0, 0, along], turn))
+    # Only spheres around both tips cross the ellipsoid: x² + y² by z, outside of each sphere.
+    with mp.workdps(40):
+        a, c, r = mpf(6.0377), mpf(12.0754), mpf(6.075)
+        volume = 4 * mp.pi / 3 * a * a * c
+        for tip in (3 - mpf(along), 3 + mpf(along)):
+            # a² (1 − z²/c²) = r² − (z − tip)²
+            p, q, s = 1 - a * a / (c * c), -2 * tip, a * a - r * r + tip * tip
+            z = (-q + mp.sqrt(q * q - 4 * p * s)) / (2 * p)
+            assert z > tip
+            beyond = mp.quad(lambda x: a * a * (1 - x * x / (c * c)), [z, c])
+            ball = mp.quad(lambda x, tip=tip: r * r - (x - tip) ** 2, [z, tip + r])
+            volume -= mp.pi * (beyond - ball)
+        assert abs(found.volume - volume) <= found.volume_error
+    assert found.volume_error <= 1e-11 * found.volume
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_volumes_lie_between_those_of_polytopes(kind):
     """With a third body around both, they are measured by planes."""

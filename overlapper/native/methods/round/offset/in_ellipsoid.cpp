@@ -803,13 +803,20 @@ class InStretched {
     for (size_t i = 0; i < 5; ++i) chord[i] += (i < 3 ? turned2[i] : 0) - level2[i] + (i < 4 ? 2 * both[i] : 0);
     // The same, without a difference of large terms.
     chord[1] = 4 * (slant[0] * dot(aside, m) - side * dot(aside, p)) + turned2[1] - level2[1] + 2 * level[0] * along[1];
-    const slicing::Roots found = slicing::roots<4>(chord, -1 - pole_n, 1 - pole_n);
+    slicing::Roots bends;
+    const slicing::Roots found = slicing::roots<4>(chord, -1 - pole_n, 1 - pole_n, &bends);
     if (found.count % 2 != 0) return false;
-    if (found.count == 0) return crossings.empty();
-    // Where A, B and C are all small, points lose digits.
+    // Where A, B and C are all small, points lose digits. A line may lie in one of the planes, as around the axis of an
+    // ellipsoid of revolution: then the quartic has a double root, or none by rounding.
     constexpr double kLeastSlope = 1e-3;
     const auto slope_at = [&](double s) { return std::sqrt(slicing::value(slope2, s)); };
-    const double largest = 2 * std::sqrt(norm2(g)) + gamma2, flattest = -slope2[1] / (2 * slope2[2]);
+    const double largest = 2 * std::sqrt(norm2(g)) + gamma2, least = kLeastSlope * largest;
+    for (int i = 0; i < bends.count; ++i) {
+      const double s = bends.t[i];
+      if (slope_at(s) <= least && std::abs(slicing::value(chord, s)) <= least * least) return false;
+    }
+    if (found.count == 0) return crossings.empty();
+    const double flattest = -slope2[1] / (2 * slope2[2]);
     std::array<Loop, 2> loops;
     const int count = found.count / 2;
     for (int i = 0; i < count; ++i) {
@@ -817,7 +824,7 @@ class InStretched {
       loop.low = found.t[2 * i], loop.high = found.t[2 * i + 1];
       if (!(slicing::value(chord, loop.middle()) > 0)) return false;
       const double inner = flattest > loop.low && flattest < loop.high ? slope_at(flattest) : largest;
-      if (!(std::min({slope_at(loop.low), slope_at(loop.high), inner}) > kLeastSlope * largest)) return false;
+      if (!(std::min({slope_at(loop.low), slope_at(loop.high), inner}) > least)) return false;
       const double sum = loop.low + loop.high, product = loop.low * loop.high;
       const double b = chord[3] + chord[4] * sum, a = chord[2] + b * sum - chord[4] * product;
       loop.rest = {-a, -b, -chord[4]};
