@@ -14,8 +14,12 @@ namespace overlapper::offset {
 /// vertex, the line lies in parallel planes across which the ellipsoid and the sphere are circles. Its points follow
 /// from the roots of one quartic.
 ///
-/// No value if facets are not exact, if the parts of a border do not follow each other, if area vectors do not add up
-/// to zero, or if the error is more than kEnough of the volume.
+/// Where surfaces meet at a small angle, rounding moves the line far along both. What its direction and the gaps
+/// between its parts may then add is a part of the error.
+///
+/// No value if facets are not exact, if the line around a vertex nearly lies in one of those planes, if the parts of a
+/// border do not follow each other, if area vectors do not add up to zero, or if the error is more than kEnough of the
+/// volume.
 std::optional<VolumeAlone> volume_in_ellipsoid(const Placed& rounded_hull, const Placed& ellipsoid);
 
 }  // namespace overlapper::offset
