@@ -1,11 +1,11 @@
-"""Where the time of volumetric contact goes: by parts of a substep, and of a pile beside Bullet's own step.
+"""Where the time of volumetric contact goes: by parts of a substep, and of piles and robots beside Bullet's own step.
 
     python benchmarks forces          all scenes, a minute or two, then the page
     python benchmarks forces --page   only the page, from the results there are
 
-The scenes with ten contacts take turns, and so do the pile and its twin, which Bullet steps; times are those of the
-processor, medians over steps. Writes forces_cost.csv, a line per scene and part, to benchmarks/results/MACHINE, and the
-page docs/forces.md.
+The scenes with ten contacts take turns, and so do a pile or a robot and its twin, which Bullet steps; times are those
+of the processor, medians over steps. Writes forces_cost.csv, a line per scene and part, to benchmarks/results/MACHINE,
+and the page docs/forces.md.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ import random
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import pybullet as p
 
+from forces import common_scenes
 from harness import results
 from harness.timing import Stopwatch, on_one_processor, timed
 from overlapper import _core
@@ -30,8 +32,12 @@ from overlapper.simulation.bullet.dynamics import BulletDynamics
 RESULTS = results.of_machine("forces_cost.csv")
 PAGE = "forces.page"
 G = 9.81
+RATE = 240  # Hz
 COLUMNS = ("scene", "part", "us")
 PILE = "pile of 200 boxes"
+SMALL_PILE = "pile of 60 boxes"
+# Common scenes of robots, stepped for all of their time.
+ROBOTS = ("panda_cube", "laikago_stand", "a1_stand", "mini_cheetah_stand", "minitaur_stand")
 STEPS = 120
 
 # The calls of a substep, and the part that the time of each counts for. A call within a call counts for its own part.
@@ -83,8 +89,8 @@ def ten(kind: int, place: Callable[[int], list[float]], **figures: Any) -> Calla
     return build
 
 
-def pile(client: int) -> None:
-    """200 boxes at random in a well, on a heap that Bullet has let come to rest."""
+def pile(client: int, boxes: int = 200) -> None:
+    """Boxes at random in a well, on a heap that Bullet has let come to rest."""
     ground(client)
     chance = random.Random(0)
     box = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
@@ -93,7 +99,7 @@ def pile(client: int) -> None:
         at = [0.42 * math.cos(k * math.pi / 2), 0.42 * math.sin(k * math.pi / 2), 0.5]
         turned = p.getQuaternionFromEuler([0, 0, k * math.pi / 2])
         p.createMultiBody(0, wall, -1, at, turned, physicsClientId=client)
-    for k in range(200):
+    for k in range(boxes):
         at = [chance.uniform(-0.3, 0.3), chance.uniform(-0.3, 0.3), 0.1 + 0.02 * k]
         turned = p.getQuaternionFromEuler([chance.uniform(-3, 3) for _ in range(3)])
         p.createMultiBody(1, box, -1, at, turned, physicsClientId=client)
@@ -146,21 +152,43 @@ def measured() -> Iterator[tuple[str, str, float]]:
                     scene.taken.clear()
         for name, scene in scenes.items():
             yield from scene.rows(name)
-    with parts_timed() as watch, ExitStack() as stack:
-        twin = p.connect(p.DIRECT)
-        stack.callback(p.disconnect, twin)
-        pile(twin)
-        ours, bullet = Scene(pile, stack), []
-        for step in range(STEPS + 60):
-            ours.step(watch)
-            bullet.append(1e6 * timed(lambda: p.stepSimulation(twin)))
-            if step < 60:
-                ours.taken.clear()
-                bullet.clear()
-        yield from ours.rows(PILE)
-        yield PILE, "bullet", median(bullet)
-        # Only at the end: depths that are asked for in each step are part of the step.
-        yield PILE, "deepest", float(ours.contact.contacts.overlaps.depth.max(initial=0))
+    for name, build in ((PILE, pile), (SMALL_PILE, partial(pile, boxes=60))):
+        with parts_timed() as watch, ExitStack() as stack:
+            twin = p.connect(p.DIRECT)
+            stack.callback(p.disconnect, twin)
+            build(twin)
+            ours, bullet = Scene(build, stack), []
+            for step in range(STEPS + 60):
+                ours.step(watch)
+                bullet.append(1e6 * timed(partial(p.stepSimulation, twin)))
+                if step < 60:
+                    ours.taken.clear()
+                    bullet.clear()
+            yield from ours.rows(name)
+            yield name, "bullet", median(bullet)
+            # Only at the end: depths that are asked for in each step are part of the step.
+            yield name, "deepest", float(ours.contact.contacts.overlaps.depth.max(initial=0))
+    for name in ROBOTS:
+        yield from of_robot(name)
+
+
+def of_robot(name: str) -> Iterator[tuple[str, str, float]]:
+    """A common scene of a robot and its twin, without the time of the scene's own commands."""
+    scene = common_scenes.SCENES[name]
+    with ExitStack() as stack:
+        worlds = [common_scenes.new_world() for _ in range(2)]  # they disconnect when they are deleted
+        scripts = [scene.build(world) for world in worlds]
+        contact = stack.enter_context(VolumetricContact(Bodies(worlds[0]._client)))
+        taken: dict[str, list[float]] = {"step": [], "bullet": [], "substeps": []}
+        for index in range(round(scene.seconds * RATE)):
+            for script in scripts:
+                if script.command:
+                    script.command(index / RATE)
+            taken["step"].append(1e6 * timed(contact.step))
+            taken["bullet"].append(1e6 * timed(worlds[1].stepSimulation))
+            taken["substeps"].append(contact.substeps)
+    for part, values in taken.items():
+        yield name.replace("_", " "), part, median(values)
 
 
 def measure(_: Namespace, path: Path) -> None:

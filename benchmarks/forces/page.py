@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from forces import cost, firsttry, physics
-from forces.cost import PARTS, PILE
+from forces.cost import PARTS, PILE, SMALL_PILE
 from forces.physics import LAWS
 from harness import charts, results
 from harness.charts import BOOK, INK, OURS, Panel, Series
@@ -179,18 +179,25 @@ def cost_table(path: Path) -> str:
     for row in rows:
         found.setdefault(row["scene"], {})[row["part"]] = float(row["us"])
     lines = {part: part for part in PARTS} | {"rest": "else", "substep": "**all**"}
+    by_parts = {name: of_scene for name, of_scene in found.items() if "substep" in of_scene and name != SMALL_PILE}
     said = table(
-        ["µs of a substep", *found],
-        ([words, *(f"{of_scene[part]:,.0f}" for of_scene in found.values())] for part, words in lines.items()),
+        ["µs of a substep", *by_parts],
+        ([words, *(f"{of_scene[part]:,.0f}" for of_scene in by_parts.values())] for part, words in lines.items()),
     )
+    beside = table(
+        ["scene", "substeps", "ms of a step, Bullet", "volumetric", "times"],
+        (
+            [name, f"{each['substeps']:.0f}", f"{each['bullet'] / 1e3:.2g}", f"{each['step'] / 1e3:.2g}",
+             f"{each['step'] / each['bullet']:.1f}"]
+            for name, each in found.items() if "bullet" in each
+        ),
+    )  # fmt: skip
     pile = found[PILE]
     told = (
-        f"The {PILE} has {pile['contacts']:,.0f} contacts, at 240 Hz. A step in {pile['substeps']:.0f} substeps takes "
-        f"{pile['step'] / 1e3:.1f} ms. Bullet's own step of the same pile takes {pile['bullet'] / 1e3:.1f} ms. "
-        f"Volumetric contact takes **{pile['step'] / pile['bullet']:.1f} times** as long as Bullet. The boxes of 1 kg "
-        f"are at most {pile['deepest'] * 1e3:.0f} mm deep in each other, where corners meet."
+        f"The {PILE} has {pile['contacts']:,.0f} contacts. The boxes of 1 kg are at most {pile['deepest'] * 1e3:.0f} "
+        "mm deep in each other, where corners meet. Bullet steps a twin of each scene in turn:"
     )
-    return f"{said}\n\n{fill(told, 130)}\n\n    {note}"
+    return f"{said}\n\n{fill(told, 130)}\n\n{beside}\n\n    {note}"
 
 
 def firsttry_parts(path: Path) -> dict[str, str]:

@@ -1,6 +1,7 @@
 """The page about volumetric contact: it has every experiment, and its table of times has every part of a substep."""
 
 import contextlib
+import re
 
 import pytest
 
@@ -30,14 +31,22 @@ def test_experiments_are_measured_by_both_laws():
 def test_the_parts_of_a_substep_are_timed_and_nothing_else_remains_of_it(tmp_path, monkeypatch):
     update = Bodies.update
     monkeypatch.setattr(cost, "STEPS", 2)
-    monkeypatch.setattr(cost, "pile", cost.SCENES["ten cubes on a plane"])
+    ten = cost.SCENES["ten cubes on a plane"]
+    monkeypatch.setattr(cost, "pile", lambda client, boxes=200: ten(client))
+    monkeypatch.setattr(cost, "ROBOTS", ("kinematic_pusher",))
     monkeypatch.setattr(cost, "on_one_processor", lambda: None)
     assert command.main(["forces", f"--out={tmp_path}"]) == 0
     assert Bodies.update is update
     page = (tmp_path / "forces.md").read_text(encoding="utf-8")
     assert f"| {' | '.join([*cost.SCENES, cost.PILE])} |" in page
     assert all(f"| {part} |" in page for part in [*cost.PARTS, "else", "**all**"])
-    assert "The pile of 200 boxes has 10 contacts, at 240 Hz" in page
+    assert "The pile of 200 boxes has 10 contacts" in page
+    page = page[page.index("## Time of a step") : page.index("## The force law")]
+    rows = re.findall(r"^\| (.*) \| (\d+) \| ([\d.e-]+) \| ([\d.e-]+) \| ([\d.]+) \|$", page, re.MULTILINE)
+    assert [name for name, *_ in rows] == [cost.PILE, cost.SMALL_PILE, "kinematic pusher"]
+    assert all(
+        float(times) == pytest.approx(float(ours) / float(bullet), rel=0.2) for _, _, bullet, ours, times in rows
+    )
 
 
 def test_what_is_called_within_counts_for_its_own_part():
