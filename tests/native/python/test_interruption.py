@@ -180,7 +180,9 @@ def test_ctrl_c_is_answered_within_a_second(another_process, job):
 
 def coarsely_rounded_hulls():
     a, b = RoundedHull(ball(300), 0.05), RoundedHull(ball(200), 0.1)
-    return lambda: [overlap(a, Placed(b, (x, 0.1, 0.05), TURNED)).volume for x in np.linspace(1.2, 1.3, 20)]
+    pairs = [(a, Placed(b, (x, 0.1, 0.05), TURNED)) for x in np.linspace(1.2, 1.3, 20)]
+    # The volume has a closed form. Slices measure the area, which takes tens of times as long.
+    return lambda: [(found.volume, found.area) for found in (overlap(*pair) for pair in pairs)]
 
 
 def handled(long, short):
