@@ -18,12 +18,6 @@ bool meet(const Plane& plane, const Bounds& box) {
          rounding(std::abs(lowest.x) + std::abs(lowest.y) + std::abs(lowest.z) + std::abs(plane.offset));
 }
 
-bool meet(const Bounds& a, const Bounds& b) {
-  // Compares all sides: a branch at the first failure would be unpredictable.
-  return (a.lower.x <= b.upper.x) & (b.lower.x <= a.upper.x) & (a.lower.y <= b.upper.y) & (b.lower.y <= a.upper.y) &
-         (a.lower.z <= b.upper.z) & (b.lower.z <= a.upper.z);
-}
-
 /// The middle as a sum of halves, which cannot overflow.
 Vec3 middle(const Bounds& box) { return box.lower / 2 + box.upper / 2; }
 

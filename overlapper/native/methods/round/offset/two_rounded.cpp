@@ -799,7 +799,7 @@ class TwoRounded {
     return std::abs(height);
   }
 
-  /// What the terms of a feature add to three times the volume, and the sum of the sizes.
+  /// Three times the volume that the terms of a feature add, and the sum of the sizes.
   std::pair<double, double> cone(const Target& target, const Terms& term) const {
     const Side& side = work_.sides[target.body];
     const int feature = target.feature;
@@ -1137,10 +1137,6 @@ class TwoRounded {
 void extend(Bounds& box, Vec3 point) { box = {min(box.lower, point), max(box.upper, point)}; }
 constexpr Bounds kNothing{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
 Bounds grown(const Bounds& box, double by) { return {box.lower - by * Vec3{1, 1, 1}, box.upper + by * Vec3{1, 1, 1}}; }
-bool apart(const Bounds& a, const Bounds& b) {
-  return a.lower.x > b.upper.x || b.lower.x > a.upper.x || a.lower.y > b.upper.y || b.lower.y > a.upper.y ||
-         a.lower.z > b.upper.z || b.lower.z > a.upper.z;
-}
 
 /// Starts with a body whose origin of coordinates is at `inner`.
 void start(const Placed& body, const WideVector& inner, Side& side) {
@@ -1176,7 +1172,7 @@ bool place_features(double slack, const Bounds& other, Side& side) {
   side.crossed.assign(side.features(), 0), side.refined.assign(side.features(), 0);
   const auto keep = [&](const Bounds& box, int feature) {
     const Bounds large = grown(box, slack);
-    const bool kept = !apart(large, other);
+    const bool kept = meet(large, other);
     if (kept) side.around.push_back({large, feature});
     return kept;
   };

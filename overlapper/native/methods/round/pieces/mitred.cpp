@@ -13,11 +13,6 @@ namespace {
 /// With more faces, cuts that visit every corner take too long.
 constexpr int kMostFaces = 64;
 
-bool meet(const Bounds& a, const Bounds& b) {
-  return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y && b.lower.y <= a.upper.y &&
-         a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
-}
-
 /// Cuts a polytope by walls; the first has this number. False if nothing is left.
 bool cut_by(std::span<const Wall> walls, int first, EnclosingPolytope& polytope) {
   for (const Wall& wall : walls) {
