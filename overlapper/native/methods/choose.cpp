@@ -297,18 +297,16 @@ std::optional<Vec3> common_point_on_line_of_centres(const Placed& a, const Place
   return from + (first + last) / 2 * way;
 }
 
-/// Proves without a search that deep bodies overlap. One body, ball, capsule, cylinder or ellipsoid, certainly holds a
-/// point of the other body.
-std::optional<Search> found_at_centres(const Arrangement& at, Search search) {
-  const Placed &a = at.relative[0], &b = at.relative[1];
+/// Proves without a search that deep bodies overlap, one of them a ball, a capsule, a cylinder or an ellipsoid: one
+/// body certainly holds a point of the other body.
+bool overlap_at_centres(const Placed& a, const Placed& b, Search& search) {
   const auto known = [](const Shape& shape) { return bounded(shape) && !rounded_hull(shape); };
-  if (!known(a.shape) || !known(b.shape) || !(smooth(a.shape) || smooth(b.shape))) return std::nullopt;
+  if (!known(a.shape) || !known(b.shape) || !(smooth(a.shape) || smooth(b.shape))) return false;
   const std::optional<Vec3> point = common_point_on_line_of_centres(a, b);
-  if (!point) return std::nullopt;
-  if (!holds(a, *point, search.reach) && !holds(b, *point, search.reach)) return std::nullopt;
+  if (!point || !(holds(a, *point, search.reach) || holds(b, *point, search.reach))) return false;
   search.status = Status::kOverlapping, search.way = Way::kDual;
   search.between = point_both_hold(a, b, *point, search.reach);
-  return search;
+  return true;
 }
 
 /// A point inside both bodies, about in the middle of what both radii reach between the nearest points of the cores. No
@@ -355,7 +353,7 @@ Search search(const Arrangement& at) {
   for (const Placed& body : bodies) search.reaches.push_back(magnitude(body));
   search.reach = *std::ranges::max_element(search.reaches);
   if (bodies.size() == 2 && (bounded(bodies[0].shape) || bounded(bodies[1].shape))) {
-    if (auto found = found_at_centres(at, search)) return *found;
+    if (overlap_at_centres(bodies[0], bodies[1], search)) return search;
     const Distance d = distance(bodies[0], bodies[1]);
     if (d.gap > doubt(search.reach)) return search;
     search.hints = facing_planes(bodies, d);
