@@ -12,6 +12,7 @@
 #include "geometry/wide_pose.h"
 #include "methods/round/slicing/polynomials.h"
 #include "methods/round/slicing/rules.h"
+#include "methods/round/slicing/slice.h"
 #include "shapes/hull_data.h"
 
 namespace overlapper::offset {
@@ -20,16 +21,16 @@ namespace in_ellipsoid {
 
 /// Rounding of a term, relative to its size. No term takes more than 100 operations that each may round.
 constexpr double kOfTermsInEllipsoid = 64 * kUnit;
-/// Rounding of places, relative to the sizes of all numbers they come from: a difference, a rotation and a stretch, or
-/// the terms of the excess, take no more than eight roundings that add up.
+/// Rounding of places, relative to the sizes of all numbers they come from. A difference, a rotation and a stretch take
+/// no more than eight roundings that add up. The terms of the excess take no more, either.
 constexpr double kOfPlaces = 8 * kUnit;
 
-/// What a part of a surface, or of a border, adds.
+/// The sums of a part of a surface, or of a border.
 struct Share {
   double value = 0, size = 0;  ///< m³: three times the cones, and the sum of all terms without their signs
   double area = 0;             ///< m²; parts of a border may be negative
   Vec3 force;                  ///< m²: area vector
-  // Of the line in which both surfaces cross:
+  // The next sums are for the line in which both surfaces cross.
   double length = 0;  ///< m
   Vec3 places;        ///< m: ∫ of the place from the point; seen
   double off = 0;     ///< m²: ∫ of the distance from the point
@@ -103,19 +104,12 @@ struct Crossing {
   double place = 0;  ///< angle along that line
 };
 
-struct Flat2 {
-  double x, y;
-};
-Flat2 operator+(Flat2 a, Flat2 b) { return {a.x + b.x, a.y + b.y}; }
-Flat2 operator-(Flat2 a, Flat2 b) { return {a.x - b.x, a.y - b.y}; }
-Flat2 operator*(double s, Flat2 a) { return {s * a.x, s * a.y}; }
-double dot(Flat2 a, Flat2 b) { return a.x * b.x + a.y * b.y; }
-double cross(Flat2 a, Flat2 b) { return a.x * b.y - a.y * b.x; }
-double norm2(Flat2 a) { return dot(a, a); }
+using slicing::Point;
+double norm2(Point a) { return dot(a, a); }
 
 /// Where the border of a facet crosses the ellipsoid.
 struct FacetEnd {
-  Flat2 at;
+  Point at;
   bool leaves;
 };
 
@@ -305,7 +299,7 @@ class InStretched {
   /// m: how far the places of both surfaces may be off by rounding, if their border is so far from the point.
   double misplaced(double to_border) const {
     const double seen = to_border / h_.z;
-    // By sizes; or by the terms of the excess, most of which are small in a shallow contact.
+    // Two bounds: one by sizes, one by the terms of the excess. Most of these terms are small in a shallow contact.
     return kOfPlaces *
            std::max(farthest_, std::min(to_border, h_.x * (slope_ * seen + std::abs(excess_) + seen * seen)));
   }
@@ -394,7 +388,7 @@ class InStretched {
     share.off = share.length * std::sqrt(norm2(scaled(h_, from_point)));
     return share;
   }
-  /// What a piece of the ball's border may add; its length is seen.
+  /// The most that a piece of the ball's border may add. Its length is seen.
   double ball_doubt(Vec3 from_point, double length) const {
     return abc_ * ball_.lever(from_point + from_pole_) * length;
   }
@@ -533,8 +527,8 @@ class InStretched {
       if (to_before >= 0) divide(rest, begin - to_before);
       if (to_after >= 0) divide(rest, end + to_after);
       const double sign = to_after >= 0 ? -1.0 : 1.0;
-      // Sizes of the terms of a place, and of the excess there: its rounding moves the place along the line of the
-      // band, by more if that line meets the ellipsoid at a small angle.
+      // Sizes of the terms of a place, and of the excess there. Rounding of the excess moves the place along the line
+      // of the band. It moves farther if that line meets the ellipsoid at a small angle.
       const double size0 = norm(p.p0), size1 = norm(p.p1), size2 = norm(p.p2), length = std::sqrt(a2);
       const double from_centre = norm(point_) + norm(from.seen);
       const auto sizes_of = [&](double t, double at) {
@@ -638,7 +632,7 @@ class InStretched {
     Vec3 x = any_orthogonal(normal), y = cross(normal, x);
     // In the plane, about the foot of the point. The middle of the disc is at −beside.
     const double above = height / size, inside = -(excess_ + above * (above + 2 * dot(point_, normal)));
-    Flat2 beside{dot(point_, x), dot(point_, y)};
+    Point beside{dot(point_, x), dot(point_, y)};
     WideVector first_axis, second_axis;  // 1/m
     if (wide_) {
       const WideVector& own = normal_exactly;
@@ -660,8 +654,8 @@ class InStretched {
       const Vec3 at = over(corner.apart, h_) + scaled(k_, n);
       return {DoubleDouble{dot(at, x)}, DoubleDouble{dot(at, y)}};
     };
-    const auto plain = [](const std::array<DoubleDouble, 2>& at) { return Flat2{at[0].head, at[1].head}; };
-    const auto excess_at = [&](Flat2 at) { return norm2(at) + 2 * dot(beside, at) - inside; };
+    const auto plain = [](const std::array<DoubleDouble, 2>& at) { return Point{at[0].head, at[1].head}; };
+    const auto excess_at = [&](Point at) { return norm2(at) + 2 * dot(beside, at) - inside; };
     const auto use = [&] {
       slope_ = std::max(slope_, std::sqrt(norm2(beside))), height_ = std::max(height_, std::abs(height));
     };
@@ -675,10 +669,10 @@ class InStretched {
     double p_out = excess_at(plain(from));
     for (const int v : ring) {
       const auto to = flat(v);
-      const Flat2 p = plain(from), q = plain(to), d = q - p;
+      const Point p = plain(from), q = plain(to), d = q - p;
       // A place of the side near the point, so that far corners do not cost its digits.
       const double d2 = norm2(d), near = wide_ ? -dot(p, d) / d2 : 0;
-      const Flat2 base = wide_ ? Flat2{(from[0] + DoubleDouble{near} * (to[0] - from[0])).head,
+      const Point base = wide_ ? Point{(from[0] + DoubleDouble{near} * (to[0] - from[0])).head,
                                        (from[1] + DoubleDouble{near} * (to[1] - from[1])).head}
                                : p;
       const double q_out = excess_at(q), base_out = excess_at(base), along = dot(base + beside, d);
@@ -688,10 +682,10 @@ class InStretched {
       if (in || stays || (chord > 0 && -along > -near * d2 && -along < (1 - near) * d2)) {
         any = true;
         const double root = std::sqrt(std::max(0.0, chord));
-        const Flat2 first = in ? p : base + (along < 0 ? base_out / (root - along) : -(along + root) / d2) * d;
-        const Flat2 last = stays ? q : base + (along < 0 ? (root - along) / d2 : -base_out / (along + root)) * d;
+        const Point first = in ? p : base + (along < 0 ? base_out / (root - along) : -(along + root) / d2) * d;
+        const Point last = stays ? q : base + (along < 0 ? (root - along) / d2 : -base_out / (along + root)) * d;
         area += cross(first, last) / 2;
-        const auto add_end = [&](Flat2 at, bool leaves) {
+        const auto add_end = [&](Point at, bool leaves) {
           ends.push_back({at, leaves});
           // Rounding of the excess moves an end along its side.
           const double all = std::sqrt(norm2(at) + above * above), to_at = std::abs(dot(beside, at));
@@ -708,22 +702,22 @@ class InStretched {
     }
     const double to_area = abc_ / size;
     // An arc of the disc's border, where the facet is on the left and the ball's part on the right.
-    const auto add_arc = [&](Flat2 begin, double angle) {
+    const auto add_arc = [&](Point begin, double angle) {
       crossed_ = true;
       use();
-      const Flat2 arm = begin + beside;
+      const Point arm = begin + beside;
       const int parts = 1 + static_cast<int>(angle);
       const double most = std::tan(angle / parts / 2);
       for (int i = 0; i < parts; ++i) {
         const double before = angle * i / parts, sine = std::sin(before), half = std::sin(before / 2);
         const double less = 2 * half * half;
-        const Flat2 start{begin.x - less * arm.x - sine * arm.y, begin.y - less * arm.y + sine * arm.x};
-        const Flat2 own{start.x + beside.x, start.y + beside.y};
+        const Point start{begin.x - less * arm.x - sine * arm.y, begin.y - less * arm.y + sine * arm.x};
+        const Point own{start.x + beside.x, start.y + beside.y};
         // By the tangent of half an angle.
         const auto of_arc = [&](double t) {
           const double scale = 2 / (1 + t * t), s = t * scale, c = t * s;
-          const Flat2 at{start.x - c * own.x - s * own.y, start.y - c * own.y + s * own.x};
-          const Flat2 slope{scale * (-s * own.x - (1 - c) * own.y), scale * (-s * own.y + (1 - c) * own.x)};
+          const Point at{start.x - c * own.x - s * own.y, start.y - c * own.y + s * own.x};
+          const Point slope{scale * (-s * own.x - (1 - c) * own.y), scale * (-s * own.y + (1 - c) * own.x)};
           Share share = -1.0 * ball_share(foot + (at.x * x + at.y * y), slope.x * x + slope.y * y);
           const double more = to_area * cross(at, slope) / 2;
           share.value += height * more, share.size += std::abs(height * more);
@@ -734,12 +728,12 @@ class InStretched {
       }
       return true;
     };
-    if (!any) return !around || add_arc(Flat2{std::sqrt(square), 0} - beside, 2 * kPi);
+    if (!any) return !around || add_arc(Point{std::sqrt(square), 0} - beside, 2 * kPi);
     for (size_t i = 0; i < ends.size(); ++i) {
       const FacetEnd &a = ends[i], &b = ends[(i + 1) % ends.size()];
       if (a.leaves == b.leaves) return false;
       if (!a.leaves) continue;
-      const Flat2 arm = a.at + beside, to = b.at - a.at;
+      const Point arm = a.at + beside, to = b.at - a.at;
       // A turn of nearly nothing may as well be a whole turn.
       constexpr double kDoubtful = 1e-9;
       if (!(norm2(to) > kDoubtful * kDoubtful * (norm2(a.at) + norm2(b.at)))) return false;
@@ -940,7 +934,7 @@ class InStretched {
   bool crossed_ = false, poking_ = false;
   WideVector steepness_;    ///< 1/m: the point over the half axes
   WideVector exact_point_;  ///< m
-  // Of all features that are used:
+  // The next numbers are the largest of all features that are used.
   double farthest_ = 0;              ///< m: sizes of numbers that places are sums of, if they are not exact
   double slope_ = 0;                 ///< of the ball, where the feature is nearest to the point
   double height_ = 0, lateral_ = 0;  ///< m: heights above the point, and sizes along the surface
