@@ -9,17 +9,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from rounded_shapes import CUBE_CORNERS, FLAT_TO_ROUNDING, points
 
 from overlapper import Box, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
-CUBE_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 TURNS = [(0, 0, 0, 1), (0, 0, 1, 1), (1, 1, 1, 1), (0.1, 0.2, 0.3, 0.4), (1e-9, 0, 0, 1)]
 FAR = np.array([1e6, -2e6, 0.5e6])
-
-
-def points(rng, count):
-    rows = rng.normal(size=(count, 3))
-    return rows / np.linalg.norm(rows, axis=1)[:, None] * rng.uniform(0.3, 0.6, 3)
 
 
 def drawn(rng):
@@ -273,15 +268,7 @@ def crossing_plates(seed):
 
 def test_a_core_that_is_flat_to_rounding_keeps_corners_where_only_two_facets_meet():
     """Between top and bottom, such a corner may be far from the line of its neighbours."""
-    corners = [
-        [-228.19018762913493, 168.64895585679642, 49.94688694664977],
-        [208.89060241078056, 91.20957163156146, 241.2532994344141],
-        [-1.5218986605436082, -289.2615215173071, -336.8837252444207],
-        [369.4785276482767, -243.63975097199156, -44.943498982643604],
-        [67.44932784485637, 218.22931835339494, 297.97333844466164],
-        [334.93212040715406, -158.65599274463904, 31.690779149099114],
-    ]
-    assert len(Hull(corners).vertices) == 6
-    found = overlap(RoundedHull(corners, 4.745431674454119), HalfSpace([0, 1, 0], -35.5782))
+    assert len(Hull(FLAT_TO_ROUNDING).vertices) == 6
+    found = overlap(RoundedHull(FLAT_TO_ROUNDING, 4.745431674454119), HalfSpace([0, 1, 0], -35.5782))
     lower, upper = found.certificate().verify()
     assert lower - Fraction(found.volume_error) <= Fraction(found.volume) <= upper + Fraction(found.volume_error)

@@ -9,11 +9,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from rounded_shapes import CUBE_CORNERS, HALF, cap, lens, points, rounded_box, within
 
 from overlapper import HalfSpace, Placed, RoundedHull, Sphere, overlap
 
-CUBE_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-HALF = np.array([0.5, 0.25, 0.125])
 TURNS = [(0, 0, 0, 1), (0, 0, 1, 1), (1, 1, 1, 1), (0, 0.6, 0, 0.8)]
 FAR = np.array([2.0**20, -(2.0**21), 2.0**19])
 DEPTHS = [2.0**-4, 2.0**-8, 2.0**-16, 2.0**-24]
@@ -24,11 +23,6 @@ BALL = 0.375
 def digits():
     with mp.workdps(40):
         yield
-
-
-def points(rng, count):
-    rows = rng.normal(size=(count, 3))
-    return rows / np.linalg.norm(rows, axis=1)[:, None] * rng.uniform(0.3, 0.6, 3)
 
 
 def pair(rng, depth=None, far=0.0):
@@ -43,24 +37,6 @@ def pair(rng, depth=None, far=0.0):
             found = overlap(a, b)
         if found:
             return Placed(a.shape, a.position + far), Placed(body, b.position + far, b.orientation)
-
-
-def rounded_box(r, at=(0, 0, 0), turn=(0, 0, 0, 1)):
-    return Placed(RoundedHull(CUBE_CORNERS * HALF, r), at, turn)
-
-
-def within(found, expected, beside=2e-15):
-    """The stated error holds, but for the rounding of a position that the test gives."""
-    return abs(mpf(found.volume) - expected) <= mpf(found.volume_error) + beside * abs(expected)
-
-
-def cap(radius, depth):
-    return mp.pi * depth**2 * (3 * radius - depth) / 3
-
-
-def lens(a, b, apart):
-    depth = a + b - apart
-    return mp.pi * depth**2 * (apart**2 + 2 * apart * (a + b) - 3 * (a - b) ** 2) / (12 * apart)
 
 
 def common_disc(a, b, apart):

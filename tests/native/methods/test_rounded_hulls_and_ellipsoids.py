@@ -5,7 +5,6 @@ same pairs, recorded before there was this way, and polytopes around and inside 
 """
 
 import csv
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +12,12 @@ import pytest
 from ellipsoid_and_tube_exact import Pair
 from ellipsoid_and_tube_exact import volume as exact_volume
 from mpmath import mp, mpf
+from rounded_shapes import HALF, UNTURNED, points, rounded_box
 from strategies import rotation
 
 from overlapper import Box, Capsule, Ellipsoid, Placed, RoundedHull, overlap
 
 SLICES = Path(__file__).with_name("rounded_hulls_and_ellipsoids.csv")
-CUBE_CORNERS = np.array(list(product((-1, 1), repeat=3)), float)
-HALF = np.array([0.5, 0.25, 0.125])
-UNTURNED = (0, 0, 0, 1)
 TURNS = [UNTURNED, (0, 0, 1, 1), (1, 1, 1, 1), (0, 0.6, 0, 0.8), (0, 0, 1, 0), (1, 0, 0, 1)]
 FAR = np.array([2.0**20, -(2.0**21), 2.0**19])
 
@@ -29,15 +26,6 @@ FAR = np.array([2.0**20, -(2.0**21), 2.0**19])
 def digits():
     with mp.workdps(40):
         yield
-
-
-def points(rng, count):
-    rows = rng.normal(size=(count, 3))
-    return rows / np.linalg.norm(rows, axis=1)[:, None] * rng.uniform(0.3, 0.6, 3)
-
-
-def rounded_box(r, half=HALF, at=(0, 0, 0), turn=UNTURNED):
-    return Placed(RoundedHull(CUBE_CORNERS * half, r), at, turn)
 
 
 def turns(rng, count=2):
@@ -60,7 +48,7 @@ def aligned(rng):
     half = rng.choice([0.5, 0.25, 0.125, 0.4], 3)
     at = rng.choice([0, 1, -1, 0.5, 0.75, 1.1], 3) * half
     turn = TURNS[rng.integers(len(TURNS))]
-    return Placed(Ellipsoid(axes), at, turn), rounded_box(rng.choice([1e-3, 0.03, 0.0625, 0.125, 0.25]), half)
+    return Placed(Ellipsoid(axes), at, turn), rounded_box(rng.choice([1e-3, 0.03, 0.0625, 0.125, 0.25]), half=half)
 
 
 def centre_on_the_surface(rng):
@@ -117,7 +105,7 @@ def in_a_plane_of_symmetry(rng):
     at = np.array([(1, 1, 0), (1, 1, 1), (1, 0, 0)][rng.integers(3)]) * 0.25 * rng.uniform(0.5, 1.6)
     turn = (UNTURNED, (0, 0, np.sin(np.pi / 8), np.cos(np.pi / 8)))[rng.integers(2)]
     axes = [*rng.permutation([0.1, 0.2, 0.3])[:2], 0.15]
-    return Placed(Ellipsoid(axes), at, turn), rounded_box(rng.choice([0.01, 0.05, 0.125]), np.full(3, 0.25))
+    return Placed(Ellipsoid(axes), at, turn), rounded_box(rng.choice([0.01, 0.05, 0.125]), half=np.full(3, 0.25))
 
 
 def just_poking_out(rng):
@@ -204,7 +192,7 @@ NEARLY_TANGENT = [
 @pytest.mark.parametrize("case", NEARLY_TANGENT)
 def test_where_surfaces_nearly_touch_all_along_a_line_errors_hold(case):
     r, half, axes, turn, turn_of_ellipsoid, volume, error = case
-    found = overlap(rounded_box(r, half, turn=turn), Placed(Ellipsoid(axes), (0, 0, 0), turn_of_ellipsoid))
+    found = overlap(rounded_box(r, turn=turn, half=half), Placed(Ellipsoid(axes), (0, 0, 0), turn_of_ellipsoid))
     assert abs(found.volume - volume) <= found.volume_error + error
 
 

@@ -7,10 +7,10 @@ body around both, and certificates.
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from rounded_shapes import CUBE_CORNERS, HALF, cap, lens, points, rounded_box, within
 
 from overlapper import Box, Capsule, Placed, RoundedHull, overlap
 
-CUBE_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 OCTAHEDRON = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], float)
 PRISM = np.array([[0.4 * np.cos(t), 0.4 * np.sin(t), z] for t in np.arange(12) * np.pi / 6 for z in (-0.2, 0.2)])
@@ -29,7 +29,6 @@ TURNS = [
     (0.1, 0.2, 0.3, 0.4),
 ]
 PLACES = [0, 0, 0, 0.0625, 0.125, 0.25, 0.3, 0.5, -0.25, -0.5, 1e-3, 0.4]
-HALF = np.array([0.5, 0.25, 0.125])
 FAR = np.array([2.0**20, -(2.0**21), 2.0**19])
 DEPTHS = [2.0**-5, 2.0**-8, 2.0**-12, 2.0**-16]
 
@@ -38,29 +37,6 @@ DEPTHS = [2.0**-5, 2.0**-8, 2.0**-12, 2.0**-16]
 def digits():
     with mp.workdps(40):
         yield
-
-
-def points(rng, count):
-    rows = rng.normal(size=(count, 3))
-    return rows / np.linalg.norm(rows, axis=1)[:, None] * rng.uniform(0.3, 0.6, 3)
-
-
-def rounded_box(r, at=(0, 0, 0), turn=(0, 0, 0, 1), half=HALF):
-    return Placed(RoundedHull(CUBE_CORNERS * half, r), at, turn)
-
-
-def within(found, expected, beside=2e-15):
-    """The stated error holds, but for the rounding of a position that the test gives."""
-    return abs(mpf(found.volume) - expected) <= mpf(found.volume_error) + beside * abs(expected)
-
-
-def cap(radius, depth):
-    return mp.pi * depth**2 * (3 * radius - depth) / 3
-
-
-def lens(a, b, apart):
-    depth = a + b - apart
-    return mp.pi * depth**2 * (apart**2 + 2 * apart * (a + b) - 3 * (a - b) ** 2) / (12 * apart)
 
 
 def crossing_cylinders(a, b, apart, sine):
