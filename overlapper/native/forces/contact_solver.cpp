@@ -594,8 +594,8 @@ class ContactSolver::Newton {
   static double& at(Six& of, int k) { return k < 3 ? of.normal[k] : of.tangential[k - 3]; }
   static double at(const Six& of, int k) { return k < 3 ? of.normal[k] : of.tangential[k - 3]; }
 
-  /// A side of a patch that moves: its block, the slip by each of its coordinates (6 rows), and the change of each
-  /// coordinate by a wrench in 1 s (rows of 6).
+  /// A side of a patch that moves. `rows` has the slip by each of its coordinates (6 rows). `answers` has the change of
+  /// each coordinate by a wrench in 1 s (rows of 6).
   struct Part {
     int block = -1, coordinates = 0;
     const double *rows = nullptr, *answers = nullptr;

@@ -214,8 +214,8 @@ double area_by_corners(Workspace& w) {
   return area;
 }
 
-/// What the moved walls may cut off from the common polytope. That is no larger than its projection to the wall times
-/// the way that it reaches beyond. Rounding makes the projection less than twice as large.
+/// m³: bound of the volume that the moved walls may cut off from the common polytope. It is the projection to the wall
+/// times the way that the polytope reaches beyond. Rounding makes the projection less than twice as large.
 double cut_off(Workspace& w) {
   if (w.moved.empty()) return 0;
   area_by_corners(w);
@@ -237,7 +237,7 @@ void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reac
   std::optional<Sums> sums;
   double area = 0, error = kInfinity;
   for (Approach approach : {Approach::kOnce, Approach::kTwice}) {
-    std::ranges::copy(w.by_doubles, w.vertices.begin());
+    if (approach == Approach::kTwice) std::ranges::copy(w.by_doubles, w.vertices.begin());
     const std::optional<double> corner_rounding = place_in_wide(
         {a, b, w.first.facets, w.apex, w.corners, middle, reach}, axes, w.vertices, w.wide_planes, approach);
     if (!corner_rounding) return;

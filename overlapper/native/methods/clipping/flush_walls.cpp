@@ -20,8 +20,8 @@ double height(const Solid& solid, int plane, Vec3 point) {
 }
 
 bool move_wall(Solid& solid, int wall, double way, double doubt) {
-  thread_local std::vector<int>
-      edges;  // per vertex: -1 off the wall, otherwise the number of edges that leave the wall
+  // Per vertex: -1 off the wall, otherwise the number of edges that leave the wall.
+  thread_local std::vector<int> edges;
   edges.assign(solid.vertices, -1);
   for (const Edge& e : solid.edges)
     if (e.left == wall || e.right == wall) edges[e.from] = edges[e.to] = 0;

@@ -33,10 +33,10 @@ enum class Approach {
 };
 
 /// Replaces the corners' coordinates from doubles by coordinates along orthogonal axes, the rows of `axes`. The error
-/// of each is half an ulp of itself plus the returned length, in m. With `kTwice`, only its distances from its planes
-/// are. Works in double-double from the numbers that define
-/// the bodies: corners of hulls, half extents, positions and orientations. An orientation is the exact rotation of its
-/// quaternion of any length. No value if only rounding has merged the triangles of a facet.
+/// of each is half an ulp of itself plus the returned length, in m. With `kTwice`, that length bounds the distances
+/// from its planes only. Works in double-double from the numbers that define the bodies: corners of hulls, half
+/// extents, positions and orientations. An orientation is the exact rotation of its quaternion of any length. No value
+/// if only rounding has merged the triangles of a facet.
 ///
 /// The dual hull in double-double would answer instead. It takes 3.4 times the time per pair of boxes that share 1e-13
 /// to 1e-10 m, and 1.2 times over the sliver families. In the scenes the difference is within the scatter (medians of 7
