@@ -194,8 +194,9 @@ def cost_table(path: Path) -> str:
     )  # fmt: skip
     pile = found[PILE]
     told = (
-        f"The {PILE} has {pile['contacts']:,.0f} contacts. The boxes of 1 kg are at most {pile['deepest'] * 1e3:.0f} "
-        "mm deep in each other, where corners meet. Bullet steps a twin of each scene in turn:"
+        f"The {PILE} has {pile['contacts']:,.0f} contacts. At the end, the boxes of 1 kg are at most "
+        f"{pile['deepest'] * 1e3:.0f} mm deep in each other, where corners meet. Bullet steps a twin of "
+        "each scene in turn:"
     )
     return f"{said}\n\n{fill(told, 130)}\n\n{beside}\n\n    {note}"
 
