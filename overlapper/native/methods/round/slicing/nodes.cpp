@@ -563,9 +563,18 @@ void add_face(const Line& plane, const Stack& stack, const Outline& outline, dou
       std::abs(plane.rate);
   // If the tilts of both ends are u together, they meet where u is more than the thickness h between the ends, and
   // u − h is at most u² / 4h. For tilts v and w, u² is at most 2 (v² + w²).
-  const Vec3 s = face.squares;
-  const double square = tilt.x * tilt.x * s.x + tilt.y * tilt.y * s.y + 2 * tilt.x * tilt.y * face.products.z;
-  sum.uneven += std::max(0.0, square) / (2 * (stack.high - stack.low) * plane.rate * plane.rate);
+  const auto squared = [&](Point slope) {
+    const Vec3 s = face.squares;
+    return std::max(0.0, slope.x * slope.x * s.x + slope.y * slope.y * s.y + 2 * slope.x * slope.y * face.products.z);
+  };
+  sum.uneven += squared(tilt) / (2 * (stack.high - stack.low) * plane.rate * plane.rate);
+  // A plane beyond the end cuts where its tilt u against this plane is more than the gap h between both.
+  for (const Line& other : stack.farther) {
+    if ((other.rate > 0) != (plane.rate > 0)) continue;
+    const double square = squared((1 / other.rate) * (other.normal + other.normal_tail) - (1 / plane.rate) * tilt);
+    const double gap = std::abs(other.offset / other.rate - t), all = std::sqrt(std::abs(area) * square);
+    sum.uneven += square < 4 * gap * all ? square / (4 * gap) : all;
+  }
   sum.blur += std::abs(area) * (std::abs(plane.offset) + std::abs(plane.rate * t)) / std::abs(plane.rate);
   const double owned = plane.owner == kCut ? 0 : stack.stretch ? stack.area({0, 0, area}) : area;
   sum.area += owned;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "geometry/moments.h"
 #include "methods/round/quadric/stretch.h"
@@ -125,6 +126,7 @@ struct Stack {
   int ball = -1;                              ///< number of the ball among the quadrics, or -1
   double low = 0, high = 0;                   ///< slices lie between these values of t, if there are any
   std::optional<Line> low_plane, high_plane;  ///< planes parallel to the slices that end the stack, if any
+  std::vector<Line> farther;                  ///< planes parallel to the slices, but for a tilt, beyond these ends
   Vec3 l, m, n, t;                            ///< the axes, in the world
   Point shear;                                ///< components of t along l and m
   std::optional<View> view;                   ///< set if a surface is viewed
@@ -203,7 +205,7 @@ struct Integrals : Moments {
   double border = 0;             ///< ∫ dA over all of the surface
   double cut_border = 0;         ///< ∫ dA over the cuts through bodies
   double correction = 0;         ///< of the volume: first-order effect of the tails of planes
-  double uneven = 0;             ///< of the volume: bound of the second-order effect of the tilts of end planes
+  double uneven = 0;             ///< of the volume: bound of the second-order effects of the tilts of end planes
   double blur = 0;               ///< of the volume: the size of the terms in the sums for lines
   std::array<double, 6> seen{};  ///< ∫ 1, u, v, u², uv and v² over the viewed surface
 

@@ -216,8 +216,10 @@ Line line_of(const Wall& wall, const Axes& axes) {
 /// Ends the stack at a plane parallel to the slices.
 void end_stack(Stack& stack, const Line& line) {
   const double end = line.offset / line.rate;
-  if (line.rate > 0 && end < stack.high) stack.high = end, stack.high_plane = line;
-  if (line.rate < 0 && end > stack.low) stack.low = end, stack.low_plane = line;
+  const bool upper = line.rate > 0, nearer = upper ? end < stack.high : end > stack.low;
+  std::optional<Line>& plane = upper ? stack.high_plane : stack.low_plane;
+  if (!nearer || plane) stack.farther.push_back(nearer ? *plane : line);
+  if (nearer) (upper ? stack.high : stack.low) = end, plane = line;
 }
 
 void add_round(Stack& stack, const Round& r, const Axes& axes) {
