@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "geometry/constants.h"
 #include "methods/round/slicing/nodes.h"
 
 namespace overlapper::slicing {
@@ -280,7 +281,7 @@ class Candidates {
     const Line &a = stack_.line[i], &b = stack_.line[j];
     const Place g = gradient(a), h = gradient(b), d = overlapper::cross(g, h);
     const double length2 = norm2(d);
-    if (!(length2 > 1e-24 * norm2(g) * norm2(h))) return;
+    if (!(length2 > kUnit * kUnit * norm2(g) * norm2(h))) return;
     const Place p = (a.offset * overlapper::cross(h, d) + b.offset * overlapper::cross(d, g)) / length2;
     if (std::abs(d.z) < 1e-9 * std::sqrt(length2)) {
       add(p.z);
