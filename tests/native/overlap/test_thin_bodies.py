@@ -4,6 +4,7 @@ stated error says so."""
 import numpy as np
 import pytest
 from families import pierced
+from plain_cases import CUBE
 from rules import (
     UNPROVED,
     answer,
@@ -11,9 +12,9 @@ from rules import (
     errors_of_depth_and_distance_are_small,
     volume_of_round_pairs_is_known_to_eleven_digits,
 )
-from strategies import quaternion
+from strategies import quaternion, rotation
 
-from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Placed, RoundedHull, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
 LOOSE = {errors_of_depth_and_distance_are_small, volume_of_round_pairs_is_known_to_eleven_digits}
 RULES = tuple(rule for rule in UNPROVED if rule not in LOOSE)
@@ -76,3 +77,29 @@ def test_equal_hulls_all_but_cut_off_by_a_plane_have_a_part_no_larger_than_a_bod
     plane = HalfSpace([-1, 0, 0], -1 + 1e-12)
     found = overlap(plane, hull, hull, hull)
     assert found.volume_error <= overlap(hull, hull).volume
+
+
+def test_groups_of_plates_with_nearly_the_same_ends_agree_with_the_pair():
+    """Slices of such a group end at one plane. The other plane, tilted by 1e-12, cuts off more than rounding."""
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        orientation, place = rng.normal(size=4), 0.3 * rng.normal(size=3)
+        tilted = orientation + 10.0 ** rng.uniform(-13, -11) * rng.normal(size=4)
+        one, other = (
+            Placed(Hull(np.array(CUBE) * [1, 1, 10.0 ** rng.uniform(-6, -4)]), place, turn)
+            for turn in (orientation, tilted)
+        )
+        pair, group = overlap(one, other), overlap(one, other, Placed(Sphere(20)))
+        assert abs(pair.volume - group.volume) <= pair.volume_error + group.volume_error
+
+
+def test_groups_of_a_ball_beside_a_corner_of_its_own_radius_agree_with_the_pair():
+    """Planes of the corner's bands are tilted by 1e-13 against the plane between both balls, and cross inside them."""
+    rng = np.random.default_rng(6)
+    for _ in range(40):
+        hull, place = RoundedHull(np.array(CUBE) * [0.5, 1, 1], 0.1), rng.normal(size=3)
+        corner = rotation(turn := quaternion(rng)) @ hull.core.vertices[0] + place
+        ball = Placed(Sphere(0.1), corner + 10.0 ** rng.uniform(-13, -10) * rng.normal(size=3))
+        body = Placed(hull, place, turn)
+        pair, group = overlap(body, ball), overlap(body, ball, HalfSpace([0, 0, 1], 50))
+        assert abs(pair.volume - group.volume) <= pair.volume_error + group.volume_error
