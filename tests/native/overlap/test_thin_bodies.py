@@ -94,12 +94,14 @@ def test_groups_of_plates_with_nearly_the_same_ends_agree_with_the_pair():
 
 
 def test_groups_of_a_ball_beside_a_corner_of_its_own_radius_agree_with_the_pair():
-    """Planes of the corner's bands are tilted by 1e-13 against the plane between both balls, and cross inside them."""
+    """Planes of the corner's bands are tilted by as little as 1e-14, against each other and against the plane between
+    both balls. They cross inside the ball, and form thin wedges."""
     rng = np.random.default_rng(6)
-    for _ in range(40):
-        hull, place = RoundedHull(np.array(CUBE) * [0.5, 1, 1], 0.1), rng.normal(size=3)
-        corner = rotation(turn := quaternion(rng)) @ hull.core.vertices[0] + place
-        ball = Placed(Sphere(0.1), corner + 10.0 ** rng.uniform(-13, -10) * rng.normal(size=3))
-        body = Placed(hull, place, turn)
+    for _ in range(250):
+        bump = np.array(CUBE) * [0.5, 0.5, 1 + 10.0 ** rng.uniform(-14, -10)]
+        hull, place = RoundedHull(np.vstack([CUBE, bump]), 0.1), rng.normal(size=3)
+        corner = hull.core.vertices[rng.integers(len(hull.core.vertices))]
+        off = rotation(turn := quaternion(rng)) @ corner + 10.0 ** rng.uniform(-13, -10) * rng.normal(size=3)
+        body, ball = Placed(hull, place, turn), Placed(Sphere(0.1), place + off)
         pair, group = overlap(body, ball), overlap(body, ball, HalfSpace([0, 0, 1], 50))
         assert abs(pair.volume - group.volume) <= pair.volume_error + group.volume_error

@@ -4,6 +4,7 @@
 
 #include "geometry/scratch.h"
 #include "methods/round/pieces/piece.h"
+#include "methods/round/slicing/nodes.h"
 #include "methods/round/slicing/stack.h"
 #include "methods/round/slicing/whole_stack.h"
 
@@ -202,7 +203,10 @@ bool add_slices(const SlicedPiece& piece, const PieceSetting& setting, Sums& sum
   BestSum& sum = *scratch;
   sum.best.integrals = {}, sum.open = std::numeric_limits<double>::infinity();
   const bool told = look_at(*stack, setting.closely || (setting.many_walls && stack->quadrics > 1), sum.intervals);
-  if (told && sum.intervals.intervals.empty()) return true;
+  if (told && sum.intervals.intervals.empty()) {
+    sums.totals.open += slicing::beyond_ends(*stack);
+    return true;
+  }
   if (told) {
     // With few nodes, the terms say too little about a stretched area.
     keep_better(*stack, at, !setting.stretch, 0, sum);

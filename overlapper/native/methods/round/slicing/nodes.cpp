@@ -553,6 +553,25 @@ Integrals measure(const Stack& stack, const Outline& outline, double t) {
   return bundle.integrals();
 }
 
+namespace {
+
+/// The slope of a plane that ends a stack, against the slices.
+Point slope(const Line& plane) { return (1 / plane.rate) * (plane.normal + plane.normal_tail); }
+
+/// ∫ (slope · x)² over a face.
+double squared(Point slope, const Integrals& face) {
+  const Vec3 s = face.squares;
+  return std::max(0.0, slope.x * slope.x * s.x + slope.y * slope.y * s.y + 2 * slope.x * slope.y * face.products.z);
+}
+
+/// m³: a bound of ∫ max(0, slope · x − gap) over a face.
+double beyond_gap(Point slope, double gap, const Integrals& face) {
+  const double square = squared(slope, face), all = std::sqrt(std::abs(face.volume) * square);
+  return square < 4 * gap * all ? square / (4 * gap) : all;
+}
+
+}  // namespace
+
 void add_face(const Line& plane, const Stack& stack, const Outline& outline, double t, Integrals& sum) {
   const Integrals face = measure(stack, outline, t);
   const double area = face.volume;
@@ -563,18 +582,10 @@ void add_face(const Line& plane, const Stack& stack, const Outline& outline, dou
       std::abs(plane.rate);
   // If the tilts of both ends are u together, they meet where u is more than the thickness h between the ends, and
   // u − h is at most u² / 4h. For tilts v and w, u² is at most 2 (v² + w²).
-  const auto squared = [&](Point slope) {
-    const Vec3 s = face.squares;
-    return std::max(0.0, slope.x * slope.x * s.x + slope.y * slope.y * s.y + 2 * slope.x * slope.y * face.products.z);
-  };
-  sum.uneven += squared(tilt) / (2 * (stack.high - stack.low) * plane.rate * plane.rate);
-  // A plane beyond the end cuts where its tilt u against this plane is more than the gap h between both.
-  for (const Line& other : stack.farther) {
-    if ((other.rate > 0) != (plane.rate > 0)) continue;
-    const double square = squared((1 / other.rate) * (other.normal + other.normal_tail) - (1 / plane.rate) * tilt);
-    const double gap = std::abs(other.offset / other.rate - t), all = std::sqrt(std::abs(area) * square);
-    sum.uneven += square < 4 * gap * all ? square / (4 * gap) : all;
-  }
+  sum.uneven += squared(slope(plane), face) / (2 * (stack.high - stack.low));
+  for (const Line& other : stack.farther)
+    if ((other.rate > 0) == (plane.rate > 0))
+      sum.uneven += beyond_gap(slope(other) - slope(plane), std::abs(other.offset / other.rate - t), face);
   sum.blur += std::abs(area) * (std::abs(plane.offset) + std::abs(plane.rate * t)) / std::abs(plane.rate);
   const double owned = plane.owner == kCut ? 0 : stack.stretch ? stack.area({0, 0, area}) : area;
   sum.area += owned;
@@ -601,6 +612,15 @@ void add_face(const Line& plane, const Stack& stack, const Outline& outline, dou
   if (plane.owner == kCut) sum.cut_border += area;
   sum.moment[plane.owner] += stack.moment(
       Vec3{face.first.x + stack.shear.x * t * area, face.first.y + stack.shear.y * t * area, t * area}, {0, 0, side});
+}
+
+double beyond_ends(const Stack& stack) {
+  if (!stack.low_plane || !stack.high_plane) return 0;
+  const double t = stack.low + (stack.high - stack.low) / 2;
+  const Outline middle = outline(Slice(stack, t));
+  if (middle.empty()) return 0;
+  return beyond_gap(slope(*stack.high_plane) - slope(*stack.low_plane), std::max(0.0, stack.low - stack.high),
+                    measure(stack, middle, t));
 }
 
 }  // namespace overlapper::slicing

@@ -43,4 +43,8 @@ Integrals measure(const Stack& stack, const Outline& outline, double t);
 /// Adds the face in a plane parallel to the slices. It has the outline of the slice beside it, at `t`.
 void add_face(const Line& plane, const Stack& stack, const Outline& outline, double t, Integrals& sum);
 
+/// m³: a bound of the volume between the two planes that end a stack, if their order is reversed at its origin. They
+/// are tilted against each other, so that they pass each other elsewhere.
+double beyond_ends(const Stack& stack);
+
 }  // namespace overlapper::slicing

@@ -168,27 +168,37 @@ Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double t
   return turned(cross(out, n), out, tangent_of_angle, rounds, walls);
 }
 
-/// False if a wall is nearly parallel to the slices, but not parallel.
-bool even(const Axes& axes, std::span<const Wall> walls) {
-  const Vec3 l = rounded(axes.l), m = rounded(axes.m);
-  return std::ranges::none_of(walls, [&](const Wall& wall) {
+/// False if a wall is nearly parallel to the slices, but not parallel, or if the stack would be a wedge of two planes
+/// that end it.
+bool even(const Axes& axes, std::span<const Wall> walls, double extent) {
+  /// Up to this tilt of the wedge, relative to the distance of its planes, the second order of the tilt is negligible.
+  constexpr double kOfWedge = 1e-6;
+  const Vec3 l = rounded(axes.l), m = rounded(axes.m), up = rounded(axes.n);
+  const Wall *low = nullptr, *high = nullptr;
+  for (const Wall& wall : walls) {
     const Vec3 n = rounded(wall.normal);
     const double size = std::max(std::abs(dot(n, l)), std::abs(dot(n, m)));
-    return size > kParallel && size < kRushing;
-  });
+    if (size > kParallel && size < kRushing) return false;
+    if (size > kParallel) continue;
+    const Wall*& end = dot(n, up) > 0 ? high : low;
+    if (!end || wall.slack.head < end->slack.head) end = &wall;
+  }
+  if (!low || !high) return true;
+  const double tilt = norm(rounded(low->normal + high->normal)), gap = (low->slack + high->slack).head;
+  return !(tilt > kOneDirection && tilt * extent > kOfWedge * std::abs(gap));
 }
 
 bool two_cylinders(std::span<const Round> rounds) { return rounds.size() > 1 && !rounds[0].ball && !rounds[1].ball; }
 
 /// The axes number `way` among the suitable turns. If no turn is suitable, number 0 is the first turn. The slices of
 /// two cylinders whose axes are not parallel cannot be turned.
-std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall> walls, int way) {
+std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way) {
   const Axes first = choose(rounds, walls, 0);
   const bool fixed = two_cylinders(rounds) && norm(cross(rounds[0].axis, rounds[1].axis)).head > kOneDirection;
   int suit = 0;
   for (const double tangent : kTurns) {
     const Axes axes = tangent == 0 ? first : choose(rounds, walls, tangent);
-    if (even(axes, walls) && suit++ == way) return axes;
+    if (even(axes, walls, extent) && suit++ == way) return axes;
     if (fixed) break;
   }
   return way == 0 ? std::optional(first) : std::nullopt;
@@ -283,7 +293,7 @@ std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall
 
 std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way) {
   if (walls.size() > kMostWalls) return std::nullopt;
-  const std::optional<Axes> chosen = axes_of(rounds, walls, way);
+  const std::optional<Axes> chosen = axes_of(rounds, walls, extent, way);
   if (!chosen) return std::nullopt;
   const Axes& axes = *chosen;
   Stack stack;
