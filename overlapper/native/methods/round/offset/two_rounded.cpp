@@ -78,11 +78,13 @@ struct Around {
 };
 
 /// A body in the common coordinates. Features are facets, then bands, then patches. Elements are the two long sides of
-/// each band, then its two ends.
+/// each band, then its two ends. A capsule is a band between two patches. A cylinder is a band between two facets, its
+/// discs. Number 0 is at the beginning of the band.
 struct Side {
-  const OffsetSurface* surface = nullptr;  ///< null for a capsule
+  const OffsetSurface* surface = nullptr;  ///< null for a capsule or a cylinder
   const HullData* hull = nullptr;
   double r = 0, half_length = 0;
+  bool discs = false;  ///< a cylinder
   Mat3 rotation;
   WideMatrix wide_rotation;
   WideVector inner;  ///< the origin in the coordinates of the core
@@ -104,12 +106,12 @@ struct Side {
   int first_band() const { return static_cast<int>(facets.size()); }
   int first_patch() const { return first_band() + static_cast<int>(bands.size()); }
   int features() const { return first_patch() + static_cast<int>(patches.size()); }
-  bool capsule() const { return surface == nullptr; }
-  int nodes() const { return capsule() ? 2 : static_cast<int>(hull->ring.size()); }
+  bool revolved() const { return surface == nullptr; }
+  int nodes() const { return revolved() ? 2 : static_cast<int>(hull->ring.size()); }
   /// The nodes at the beginning and the end of an element.
   std::pair<int, int> ends_of(int element) const {
     const int lines_of = 2 * static_cast<int>(bands.size());
-    if (capsule()) return {element - lines_of, element - lines_of};
+    if (revolved()) return {element - lines_of, element - lines_of};
     const auto& corners = surface->edges[(element % lines_of) / 2].corners;
     if (element < lines_of)
       return element % 2 == 0 ? std::pair{corners[0], corners[1]} : std::pair{corners[2], corners[3]};
@@ -118,12 +120,12 @@ struct Side {
 };
 
 Vec3 corner_of(const Side& side, int v) {
-  if (!side.capsule()) return side.hull->vertices[v];
+  if (!side.revolved()) return side.hull->vertices[v];
   return {0, 0, v == 0 ? -side.half_length : side.half_length};
 }
 WideVector wide_corner(const Side& side, int v) { return wide(corner_of(side, v)) - side.inner; }
 std::pair<int, int> ends_of_band(const Side& side, int e) {
-  if (side.capsule()) return {0, 1};
+  if (side.revolved()) return {0, 1};
   return {side.surface->edges[e].from, side.surface->edges[e].to};
 }
 WideVector wide_along(const Side& side, int e) {
@@ -132,6 +134,10 @@ WideVector wide_along(const Side& side, int e) {
 }
 /// The plane of a moved facet about the origin.
 WidePlane wide_plane(const Side& side, int f) {
+  if (side.discs) {
+    const DoubleDouble outward{f == 0 ? -1.0 : 1.0};
+    return {{{}, {}, outward}, DoubleDouble{side.half_length} - outward * side.inner.z};
+  }
   const auto [a, b, c] = side.hull->facet_corners[f];
   const auto& corners = side.hull->corners;
   const WideVector normal = unit(wide_normal(corners[a], corners[b], corners[c]));
@@ -159,7 +165,7 @@ void refine(int feature, Side& side) {
     band.begin = t.head, band.end = dot(wide_corner(side, to), along).head, band.foot = side.rotation * rounded(foot);
     aim(band);
     band.rise = (DoubleDouble{side.r} - norm(foot)).head;
-    if (!side.capsule())
+    if (!side.revolved())
       for (const int i : {2 * e, 2 * e + 1}) side.lines[i].plane.offset = dot(side.lines[i].plane.normal, band.foot);
   } else {
     const int v = feature - side.first_patch();
@@ -168,10 +174,21 @@ void refine(int feature, Side& side) {
   }
 }
 
+/// The inside of a plane, or of a sphere about the centre of a disc, whose border is on it.
 struct Limit {
   Plane plane;
   int element;
   int body;
+  double radius = 0;  ///< of the sphere; 0 for a plane
+  Vec3 centre{};
+
+  double height(Vec3 point) const {
+    if (radius == 0) return signed_distance(plane, point);
+    return (norm2(point - centre) - radius * radius) / (2 * radius);
+  }
+  double slope(Vec3 point, Vec3 rate) const {
+    return dot(radius == 0 ? plane.normal : (point - centre) / radius, rate);
+  }
 };
 constexpr Limit kSeam{{}, -1, -1};
 
@@ -295,13 +312,14 @@ class TwoRounded {
   template <class F>
   static void for_borders(const Side& side, int feature, F f) {
     if (feature < side.first_band()) {
+      if (side.discs) return;
       const int begin = side.hull->ring_start[feature], end = side.hull->ring_start[feature + 1];
       for (int k = begin; k < end; ++k) f(side.lines[side.surface->sides[k]], 1);
     } else if (feature < side.first_patch()) {
       const int e = feature - side.first_band();
       f(side.ends[2 * e], -1), f(side.ends[2 * e + 1], -1);
-      if (!side.capsule()) f(side.lines[2 * e], -1), f(side.lines[2 * e + 1], -1);
-    } else if (side.capsule()) {
+      if (!side.revolved()) f(side.lines[2 * e], -1), f(side.lines[2 * e + 1], -1);
+    } else if (side.revolved()) {
       f(side.ends[feature - side.first_patch()], 1);
     } else {
       const int v = feature - side.first_patch();
@@ -316,6 +334,12 @@ class TwoRounded {
       if (border.element < count) return;
       work_.limits.push_back({{sign * border.plane.normal, sign * border.plane.offset}, border.element, body});
     });
+  }
+
+  /// The border of a disc.
+  Limit rim(int body, int f) const {
+    const Side& side = work_.sides[body];
+    return {{}, side.ends[f].element, body, side.r, side.vertices[f]};
   }
 
   /// True if a feature certainly has no point in a box.
@@ -409,6 +433,18 @@ class TwoRounded {
       if (slope > 0 && at < high) high = at, highest = &limit;
       if (slope < 0 && at > low) low = at, lowest = &limit;
     }
+    std::array<Limit, 2> rims;
+    for (const int body : {0, 1}) {
+      if (!work_.sides[body].discs) continue;
+      rims[body] = rim(body, features_[body]);
+      const double r = rims[body].radius, at = dot(rims[body].centre - line.start, line.x);
+      const double distance = std::sqrt(norm2(line.start + at * line.x - rims[body].centre));
+      if (std::abs(r - distance) < tie_) return false;
+      if (distance > r) return true;
+      const double half = std::sqrt((r - distance) * (r + distance));
+      if (at + half < high) high = at + half, highest = &rims[body];
+      if (at - half > low) low = at - half, lowest = &rims[body];
+    }
     if (std::abs(high - low) < tie_) return false;
     if (!(low < high)) return true;
     return lowest && highest && add(line, low, high, *lowest, *highest);
@@ -418,6 +454,10 @@ class TwoRounded {
     const Plane& plane = work_.sides[body].facets[features_[body]].plane;
     const Side& side = work_.sides[1 - body];
     const int feature = features_[1 - body];
+    work_.limits.clear();
+    append_limits(body, features_[body], true), append_limits(1 - body, feature, false);
+    const bool disc = work_.sides[body].discs;
+    const Limit border = disc ? rim(body, features_[body]) : Limit{};
     Curve conic{};
     conic.kind = Curve::Kind::kConic;
     double low = -kPi, high = kPi;
@@ -431,10 +471,16 @@ class TwoRounded {
       const auto along_plane = [&](Vec3 way) { return way - dot(plane.normal, way) / slope * band.along; };
       conic.start = band.foot - signed_distance(plane, band.foot) / slope * band.along;
       conic.x = side.r * along_plane(band.middle), conic.y = side.r * along_plane(band.across);
-      if (!side.capsule()) {
+      if (!side.revolved()) {
         const int e = feature - side.first_band();
         low = -band.half, high = band.half;
         first = {{}, side.lines[2 * e].element, 1 - body}, last = {{}, side.lines[2 * e + 1].element, 1 - body};
+      }
+      if (disc) {
+        const double distance = std::sqrt(norm2(conic.start - border.centre));
+        const double most = std::sqrt(norm2(conic.x) + norm2(conic.y));
+        if (distance - most > border.radius + tie_) return true;
+        if (!(distance + most < border.radius - tie_)) work_.limits.push_back(border);
       }
     } else {
       const int v = feature - side.first_patch();
@@ -444,9 +490,20 @@ class TwoRounded {
       if (depth < 0 || depth > 2 * side.r) return true;
       circle(conic, plane.offset * plane.normal + (centre - dot(plane.normal, centre) * plane.normal), plane.normal,
              std::sqrt(depth * (2 * side.r - depth)));
+      if (disc) {
+        // Two circles in a plane cross where the line through both points cuts them.
+        const Vec3 apart = conic.start - border.centre;
+        const double distance = std::sqrt(norm2(apart)), radius = std::sqrt(norm2(conic.x));
+        const double within = border.radius - std::abs(distance - radius), all = border.radius - distance - radius;
+        if (std::abs(within) < tie_ || std::abs(all) < tie_) return false;
+        if (within < 0) return true;
+        if (all < 0) {
+          const Vec3 normal = apart / distance;
+          const double height = (within * (within - 2 * border.radius) + 2 * distance * radius) / (2 * distance);
+          work_.limits.push_back({{normal, dot(normal, conic.start) - height}, border.element, body});
+        }
+      }
     }
-    work_.limits.clear();
-    append_limits(body, features_[body], true), append_limits(1 - body, feature, false);
     return divide(conic, low, high, first, last);
   }
 
@@ -575,7 +632,7 @@ class TwoRounded {
     quartic.closed = ratio < 1, quartic.kappa = std::min(ratio, 1.0);
     Limit low = kSeam, high = kSeam;
     double start = -kPi, end = kPi;
-    if (!side.capsule()) {
+    if (!side.revolved()) {
       const int e = features_[body] - side.first_band();
       low = {{}, side.lines[2 * e].element, body}, high = {{}, side.lines[2 * e + 1].element, body};
       const double at = std::atan2(dot(quartic.x, band.across), dot(quartic.x, band.middle));
@@ -612,8 +669,10 @@ class TwoRounded {
     work_.roots.clear(), work_.doubtful.clear();
     constexpr int kFirst = -1, kLast = -2;
     const int count = static_cast<int>(work_.limits.size());
+    // A sphere is the last limit.
+    const int planes = count > 0 && work_.limits.back().radius > 0 ? count - 1 : count;
     if (curve.kind == Curve::Kind::kConic) {
-      for (int l = 0; l < count; ++l) {
+      for (int l = 0; l < planes; ++l) {
         const Plane& plane = work_.limits[l].plane;
         const double c = signed_distance(plane, curve.start), a = dot(plane.normal, curve.x),
                      b = dot(plane.normal, curve.y), size = std::sqrt(a * a + b * b);
@@ -630,7 +689,8 @@ class TwoRounded {
           for (const double turn : {-2 * kPi, 0.0, 2 * kPi})
             if (root + turn > low && root + turn < high) work_.roots.push_back({root + turn, l});
       }
-    } else if (!find_roots(curve, low, high)) {
+      if (planes < count && !find_roots(curve, low, high, planes)) return true;
+    } else if (!find_roots(curve, low, high, 0)) {
       return true;
     }
     if (failed_) return false;
@@ -644,7 +704,7 @@ class TwoRounded {
       const Vec3 middle = curve((from.at + to.at) / 2).point;
       bool within = true, certain = true;
       for (const int l : work_.doubtful) {
-        const double height = signed_distance(work_.limits[l].plane, middle);
+        const double height = work_.limits[l].height(middle);
         within = within && height < tie_, certain = certain && height < -tie_;
       }
       if (!within) continue;
@@ -653,8 +713,8 @@ class TwoRounded {
     return true;
   }
 
-  /// Finds where a quartic passes its limits. False if all of it is beyond one of them.
-  bool find_roots(const Curve& curve, double low, double high) {
+  /// Finds where a curve passes its limits from number `from` on. False if all of it is beyond one of them.
+  bool find_roots(const Curve& curve, double low, double high, int from) {
     constexpr int kMost = 16;
     std::array<At, kMost + 1> samples;
     const int parts = high - low > 1 ? kMost : kMost / 2;
@@ -666,17 +726,17 @@ class TwoRounded {
       c = c * cosine - s * sine, s = next;
     }
     const auto place = [&](int i) { return i == parts ? high : low + i * step; };
-    for (int l = 0; l < static_cast<int>(work_.limits.size()); ++l) {
-      const Plane& plane = work_.limits[l].plane;
+    for (int l = from; l < static_cast<int>(work_.limits.size()); ++l) {
+      const Limit& limit = work_.limits[l];
       const size_t before = work_.roots.size();
-      double height = signed_distance(plane, samples[0].point), rise = dot(plane.normal, samples[0].rate);
+      double height = limit.height(samples[0].point), rise = limit.slope(samples[0].point, samples[0].rate);
       for (int i = 0; i < parts; ++i) {
-        const double next = signed_distance(plane, samples[i + 1].point),
-                     next_rise = dot(plane.normal, samples[i + 1].rate);
+        const double next = limit.height(samples[i + 1].point),
+                     next_rise = limit.slope(samples[i + 1].point, samples[i + 1].rate);
         // Between heights of the same side there is no root, unless they turn.
         const bool steady = height > 0 ? next > 0 && !(rise < 0 && next_rise > 0)
                                        : height < 0 && next < 0 && !(rise > 0 && next_rise < 0);
-        if (!steady) find_root(curve, plane, l, place(i), samples[i], place(i + 1), samples[i + 1], 0);
+        if (!steady) find_root(curve, limit, l, place(i), samples[i], place(i + 1), samples[i + 1], 0);
         height = next, rise = next_rise;
       }
       if (work_.roots.size() > before) work_.doubtful.push_back(l);
@@ -685,11 +745,11 @@ class TwoRounded {
     return true;
   }
 
-  void find_root(const Curve& curve, const Plane& plane, int l, double from, const At& a, double to, const At& b,
+  void find_root(const Curve& curve, const Limit& limit, int l, double from, const At& a, double to, const At& b,
                  int halvings) {
     const double step = to - from;
-    double one = signed_distance(plane, a.point), other = signed_distance(plane, b.point);
-    double rise = step * dot(plane.normal, a.rate), other_rise = step * dot(plane.normal, b.rate);
+    double one = limit.height(a.point), other = limit.height(b.point);
+    double rise = step * limit.slope(a.point, a.rate), other_rise = step * limit.slope(b.point, b.rate);
     const bool changes = (one > 0) != (other > 0);
     if (one < 0 || (one == 0 && other > 0)) one = -one, other = -other, rise = -rise, other_rise = -other_rise;
     bool sure = changes ? rise < 0 && other_rise < 0 : !(rise < 0 && other_rise > 0);
@@ -702,18 +762,18 @@ class TwoRounded {
     if (!sure && halvings < kMostHalvings) {
       const double middle = (from + to) / 2;
       const At between = curve(middle);
-      find_root(curve, plane, l, from, a, middle, between, halvings + 1);
-      find_root(curve, plane, l, middle, between, to, b, halvings + 1);
+      find_root(curve, limit, l, from, a, middle, between, halvings + 1);
+      find_root(curve, limit, l, middle, between, to, b, halvings + 1);
       return;
     }
     if (!sure) failed_ = true;
     if (!changes) return;
     // Newton's steps, or halves.
-    const double sign = signed_distance(plane, a.point) > 0 || one == 0 ? 1 : -1;
+    const double sign = limit.height(a.point) > 0 || one == 0 ? 1 : -1;
     double low = from, high = to, at = from + step * one / (one - other);
     for (int i = 0; i < 60; ++i) {
       const At here = curve(at);
-      const double height = sign * signed_distance(plane, here.point), slope = sign * dot(plane.normal, here.rate);
+      const double height = sign * limit.height(here.point), slope = sign * limit.slope(here.point, here.rate);
       (height > 0 ? low : high) = at;
       double next = at - height / slope;
       if (!(next > low && next < high)) next = (low + high) / 2;
@@ -947,7 +1007,7 @@ class TwoRounded {
     for (const Around& around : side.around) {
       const int e = around.feature - side.first_band();
       if (e < 0 || e >= bands) continue;
-      if (!side.capsule()) near.push_back(2 * e), near.push_back(2 * e + 1);
+      if (!side.revolved()) near.push_back(2 * e), near.push_back(2 * e + 1);
       near.push_back(lines + 2 * e), near.push_back(lines + 2 * e + 1);
     }
     std::ranges::sort(near);
@@ -1042,9 +1102,10 @@ class TwoRounded {
     std::array<Target, 2> targets;
     size_t count = 0;
     const double t = first ? band.begin : band.end, sign = first ? 1 : -1;
-    const int of_band = side.first_band() + e, of_patch = side.first_patch() + (first ? at_begin : at_end);
+    const int v = first ? at_begin : at_end, of_band = side.first_band() + e;
+    const int beside = side.discs ? v : side.first_patch() + v;
     if (side.crossed[of_band] && t != band.base) targets[count++] = {body, of_band, sign};
-    if (side.crossed[of_patch]) targets[count++] = {body, of_patch, -sign};
+    if (side.crossed[beside]) targets[count++] = {body, beside, -sign};
     if (count == 0) return true;
     Curve arc{};
     arc.kind = Curve::Kind::kConic, arc.start = band.foot + t * band.along;
@@ -1057,10 +1118,10 @@ class TwoRounded {
     const int ends = 2 * static_cast<int>(side.bands.size()), v = feature - side.first_patch();
     int node;
     if (feature < side.first_band()) {
-      node = side.hull->ring_start[feature];
+      node = side.discs ? feature : side.hull->ring_start[feature];
     } else if (v < 0) {
       node = side.ends_of(ends + 2 * (feature - side.first_band())).first;
-    } else if (side.capsule()) {
+    } else if (side.revolved()) {
       node = v;
     } else {
       const int e = side.surface->edges_at(v)[0];
@@ -1084,7 +1145,7 @@ class TwoRounded {
         MovedFacet& facet = side.facets[f];
         if (!crossed) {
           if (wide_) refine(f, side);
-          facet.twice_area = 2 * side.surface->facets[f].area;
+          facet.twice_area = 2 * (side.discs ? kPi * side.r * side.r : side.surface->facets[f].area);
         }
         const double area = facet.twice_area / 2;
         const Vec3 vector = area * facet.plane.normal;
@@ -1093,7 +1154,7 @@ class TwoRounded {
         const int e = f - side.first_band();
         Band& band = side.bands[e];
         if (!crossed) {
-          const double length = band.end - band.begin, chord = side.capsule() ? 0 : side.surface->edges[e].chord;
+          const double length = band.end - band.begin, chord = side.revolved() ? 0 : side.surface->edges[e].chord;
           band.plain = 2 * band.half * length, band.vector = side.r * chord * length * band.middle;
           band.cap = band.plain - dot(band.toward, band.vector) / side.r;
           size_ += side.r * std::abs(band.lever) * band.plain;
@@ -1104,8 +1165,8 @@ class TwoRounded {
         Patch& patch = side.patches[v];
         const double square = side.r * side.r;
         if (!crossed) {
-          const Vec3 normals = side.capsule() ? Vec3{0, 0, v == 0 ? -kPi : kPi} : side.surface->vertices[v].normals;
-          patch.angle = side.capsule() ? 2 * kPi : side.surface->vertices[v].solid_angle;
+          const Vec3 normals = side.revolved() ? Vec3{0, 0, v == 0 ? -kPi : kPi} : side.surface->vertices[v].normals;
+          patch.angle = side.revolved() ? 2 * kPi : side.surface->vertices[v].solid_angle;
           patch.vector = square * (side.rotation * normals);
           patch.cap = patch.angle - dot(patch.toward, patch.vector) / square;
           // The solid angle is a difference of angles, too.
@@ -1138,11 +1199,19 @@ void extend(Bounds& box, Vec3 point) { box = {min(box.lower, point), max(box.upp
 constexpr Bounds kNothing{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
 Bounds grown(const Bounds& box, double by) { return {box.lower - by * Vec3{1, 1, 1}, box.upper + by * Vec3{1, 1, 1}}; }
 
+/// The half sizes of the box around a disc of radius 1 across an axis.
+Vec3 reach_of_disc(Vec3 axis) {
+  const auto across = [](double a, double b) { return std::sqrt(a * a + b * b); };
+  return {across(axis.y, axis.z), across(axis.z, axis.x), across(axis.x, axis.y)};
+}
+
 /// Starts with a body whose origin of coordinates is at `inner`.
 void start(const Placed& body, const WideVector& inner, Side& side) {
   side.hull = polytope_of(body.shape), side.surface = side.hull ? &offset_surface(*side.hull) : nullptr;
   side.r = core_radius(body.shape), side.rotation = body.pose.rotation, side.inner = inner;
-  side.half_length = side.hull ? 0 : revolution(body.shape)->half_length;
+  const auto revolved = revolution(body.shape);
+  side.half_length = revolved ? revolved->half_length : 0, side.discs = revolved && !revolved->round_ends;
+  if (revolved) side.r = revolved->radius;
   side.vertices.clear();
   const int count = side.hull ? static_cast<int>(side.hull->vertices.size()) : 2;
   // Two differences keep the digits near the origin.
@@ -1152,7 +1221,20 @@ void start(const Placed& body, const WideVector& inner, Side& side) {
     side.vertices.push_back(side.rotation * ((corner_of(side, v) - from) - rest));
     extend(side.bounds, side.vertices.back());
   }
-  side.bounds = grown(side.bounds, side.r);
+  if (side.discs) {
+    const Vec3 reach = side.r * reach_of_disc(side.rotation * Vec3{0, 0, 1});
+    side.bounds = {side.bounds.lower - reach, side.bounds.upper + reach};
+  } else {
+    side.bounds = grown(side.bounds, side.r);
+  }
+}
+
+/// The least and the greatest of direction · x over a body.
+std::pair<double, double> extent_along(const Side& side, Vec3 direction) {
+  double low = kInfinity, high = -kInfinity;
+  for (const Vec3 v : side.vertices) low = std::min(low, dot(direction, v)), high = std::max(high, dot(direction, v));
+  const double r = side.discs ? side.r * norm(cross(direction, side.rotation * Vec3{0, 0, 1})) : side.r;
+  return {low - r, high + r};
 }
 
 /// Keeps the vertices whose spheres reach below `most` along `normal`.
@@ -1164,9 +1246,9 @@ void keep_near(Vec3 normal, double most, Side& side) {
 /// Places the features that may reach the box `other`. False if the normals of a vertex are spread too far.
 bool place_features(double slack, const Bounds& other, Side& side) {
   const double r = side.r;
-  const int facets = side.capsule() ? 0 : static_cast<int>(side.surface->facets.size());
-  const int bands = side.capsule() ? 1 : static_cast<int>(side.surface->edges.size());
-  const int patches = static_cast<int>(side.vertices.size());
+  const int facets = side.discs ? 2 : side.revolved() ? 0 : static_cast<int>(side.surface->facets.size());
+  const int bands = side.revolved() ? 1 : static_cast<int>(side.surface->edges.size());
+  const int patches = side.discs ? 0 : static_cast<int>(side.vertices.size());
   side.facets.resize(facets), side.bands.resize(bands), side.patches.resize(patches);
   side.lines.resize(2 * bands), side.ends.resize(2 * bands), side.around.clear(), side.crossings.clear();
   side.crossed.assign(side.features(), 0), side.refined.assign(side.features(), 0);
@@ -1176,7 +1258,15 @@ bool place_features(double slack, const Bounds& other, Side& side) {
     if (kept) side.around.push_back({large, feature});
     return kept;
   };
+  const Vec3 axis = side.rotation * Vec3{0, 0, 1}, around_axis = r * reach_of_disc(axis);
   for (int f = 0; f < facets; ++f) {
+    if (side.discs) {
+      MovedFacet& facet = side.facets[f];
+      const Vec3 normal = f == 0 ? -axis : axis, centre = side.vertices[f];
+      facet = {{normal, dot(normal, centre)}, {}, 0, keep({centre - around_axis, centre + around_axis}, f)};
+      facet.nearest = facet.plane.offset * normal;
+      continue;
+    }
     const auto ring = side.hull->facet(f);
     MovedFacet& facet = side.facets[f];
     facet.kept = false;
@@ -1192,17 +1282,17 @@ bool place_features(double slack, const Bounds& other, Side& side) {
   }
   for (int e = 0; e < bands; ++e) {
     const auto [v, w] = ends_of_band(side, e);
-    const bool near = side.capsule() || side.near[v] || side.near[w];
+    const bool near = side.revolved() || side.near[v] || side.near[w];
     const auto kept_facet = [&](int f) { return side.facets[f].kept; };
     if (!near && !kept_facet(side.surface->edges[e].left) && !kept_facet(side.surface->edges[e].right)) continue;
     Band& band = side.bands[e];
     band = {};
     const Vec3 from = side.vertices[v], to = side.vertices[w];
     Bounds box = kNothing;
-    double bulge = r;
-    if (side.capsule()) {
-      band.along = side.rotation * Vec3{0, 0, 1}, band.middle = any_orthogonal(band.along), band.half = kPi;
-      extend(box, {});
+    double bulge = 0;
+    if (side.revolved()) {
+      band.along = axis, band.middle = any_orthogonal(band.along), band.half = kPi;
+      box = {-around_axis, around_axis};
     } else {
       const OffsetSurface::Edge& edge = side.surface->edges[e];
       band.along = side.rotation * edge.along, band.middle = side.rotation * edge.middle, band.half = edge.angle / 2;
@@ -1219,7 +1309,7 @@ bool place_features(double slack, const Bounds& other, Side& side) {
     // Patches beside the band are kept if a part of them is near.
     side.ends[2 * e] = {{band.along, band.begin}, 2 * bands + 2 * e};
     side.ends[2 * e + 1] = {{-band.along, -band.end}, 2 * bands + 2 * e + 1};
-    if (!side.capsule()) {
+    if (!side.revolved()) {
       const OffsetSurface::Edge& edge = side.surface->edges[e];
       const Vec3 left = cross(band.along, side.facets[edge.left].plane.normal);
       const Vec3 right = cross(side.facets[edge.right].plane.normal, band.along);
@@ -1237,8 +1327,8 @@ bool place_features(double slack, const Bounds& other, Side& side) {
     patch.centre = side.vertices[v];
     Bounds box = kNothing;
     Vec3 pole{};
-    double least = side.capsule() ? 0 : 1;
-    if (side.capsule()) {
+    double least = side.revolved() ? 0 : 1;
+    if (side.revolved()) {
       pole = v == 0 ? -side.bands[0].along : side.bands[0].along;
     } else {
       pole = unit(side.rotation * side.surface->vertices[v].normals);
@@ -1300,9 +1390,7 @@ std::optional<VolumeAlone> volume_of_two_rounded(const Placed& a, const Placed& 
   const double extent = norm(common.upper - common.lower);
   // No point of a body is beyond its own plane across this direction.
   const Vec3 way = between ? a.tightest(origin).normal : unit(b.pose.translation - a.pose.translation);
-  double highest = -kInfinity, lowest = kInfinity;
-  for (const Vec3 v : sides[0].vertices) highest = std::max(highest, dot(way, v) + sides[0].r);
-  for (const Vec3 v : sides[1].vertices) lowest = std::min(lowest, dot(way, v) - sides[1].r);
+  const double highest = extent_along(sides[0], way).second, lowest = extent_along(sides[1], way).first;
   keep_near(-way, -lowest + slack, sides[0]), keep_near(way, highest + slack, sides[1]);
   const auto distance = [&](int body, Vec3 point) { return signed_distance(bodies[body]->tightest(point), point); };
   const auto measured = [&](bool wide_too) -> std::optional<VolumeAlone> {
