@@ -70,7 +70,7 @@ struct Crossing {
   double at;  ///< t or φ
   bool leaves;
   Vec3 point;
-  double height;  ///< m: bound of |x · u| at features beside it
+  double moment;  ///< m²: bound of |x · u| times the arm of a gap, at features beside it
 };
 struct Around {
   Bounds box;
@@ -143,6 +143,11 @@ WidePlane wide_plane(const Side& side, int f) {
   const WideVector normal = unit(wide_normal(corners[a], corners[b], corners[c]));
   return {normal, dot(normal, wide(corners[a]) - side.inner) + DoubleDouble{side.r}};
 }
+/// A direction across an axis, where a circle begins and ends. Other features of aligned bodies hardly cross it there.
+Vec3 beside(Vec3 axis) {
+  const Vec3 x = any_orthogonal(axis);
+  return 0.54 * x + std::sqrt(1 - 0.54 * 0.54) * cross(axis, x);
+}
 void aim(Band& band) {
   band.base = std::clamp(0.0, band.begin, band.end);
   band.lever = std::sqrt(norm2(band.foot));
@@ -181,6 +186,7 @@ struct Limit {
   int body;
   double radius = 0;  ///< of the sphere; 0 for a plane
   Vec3 centre{};
+  double inside = -1;  ///< m: how far a conic reaches inside a plane, if that is known to more digits
 
   double height(Vec3 point) const {
     if (radius == 0) return signed_distance(plane, point);
@@ -292,7 +298,7 @@ class TwoRounded {
     const double reach = std::min(extent_, reach_), off_place = kOfPlaces * (largest_ + reach);
     // Rounding of places leaves area vectors that do not add up to zero, but that is not an error of the volume.
     const double unbalanced = std::max(0.0, norm(unbalanced_) - off_place * border_);
-    return off_ * area_ + (kOfTermsOfTwo * size_ + open_ * reach + off_place * raised_) / 3 + unbalanced * reach;
+    return off_ * area_ + (kOfTermsOfTwo * size_ + open_ + off_place * raised_) / 3 + unbalanced * reach;
   }
 
  private:
@@ -336,6 +342,9 @@ class TwoRounded {
     });
   }
 
+  bool is_disc(int body, int feature) const {
+    return work_.sides[body].discs && feature < work_.sides[body].first_band();
+  }
   /// The border of a disc.
   Limit rim(int body, int f) const {
     const Side& side = work_.sides[body];
@@ -411,13 +420,23 @@ class TwoRounded {
     const Plane &one = work_.sides[0].facets[features_[0]].plane, &other = work_.sides[1].facets[features_[1]].plane;
     const Vec3 way = overlapper::cross(one.normal, other.normal);
     const double square = norm2(way);
-    if (!(square > kAlike * kAlike)) return false;
+    if (!(square > kAlike * kAlike)) {
+      // Common points are nearer to the origin than `extent_`.
+      const double facing = dot(one.normal, other.normal) > 0 ? 1 : -1;
+      const double turned = std::sqrt(norm2(one.normal - facing * other.normal)) + 4 * kUnit;
+      return std::abs(one.offset - facing * other.offset) > turned * extent_ + tie_;
+    }
     Curve line{};
     line.loss = 1 / std::sqrt(square);
     line.kind = Curve::Kind::kLine, line.x = way / std::sqrt(square);
     line.start =
         (one.offset * overlapper::cross(other.normal, way) + other.offset * overlapper::cross(way, one.normal)) /
         square;
+    return add_line(line);
+  }
+
+  /// Adds the part of a line on both features.
+  bool add_line(const Curve& line) {
     work_.limits.clear();
     append_limits(0, features_[0], true), append_limits(1, features_[1], true);
     double low = -kInfinity, high = kInfinity;
@@ -435,7 +454,7 @@ class TwoRounded {
     }
     std::array<Limit, 2> rims;
     for (const int body : {0, 1}) {
-      if (!work_.sides[body].discs) continue;
+      if (!is_disc(body, features_[body])) continue;
       rims[body] = rim(body, features_[body]);
       const double r = rims[body].radius, at = dot(rims[body].centre - line.start, line.x);
       const double distance = std::sqrt(norm2(line.start + at * line.x - rims[body].centre));
@@ -466,7 +485,7 @@ class TwoRounded {
     if (is_band) {
       const Band& band = side.bands[feature - side.first_band()];
       const double slope = dot(plane.normal, band.along);
-      if (std::abs(slope) < kAlike) return false;
+      if (std::abs(slope) < kAlike) return cross_parallel_band(body, slope);
       conic.loss = 1 / std::abs(slope);
       const auto along_plane = [&](Vec3 way) { return way - dot(plane.normal, way) / slope * band.along; };
       conic.start = band.foot - signed_distance(plane, band.foot) / slope * band.along;
@@ -499,12 +518,37 @@ class TwoRounded {
         if (within < 0) return true;
         if (all < 0) {
           const Vec3 normal = apart / distance;
-          const double height = (within * (within - 2 * border.radius) + 2 * distance * radius) / (2 * distance);
-          work_.limits.push_back({{normal, dot(normal, conic.start) - height}, border.element, body});
+          const double inside = within * (2 * border.radius - within) / (2 * distance);
+          const Plane chord{normal, dot(normal, conic.start) + inside - radius};
+          work_.limits.push_back({chord, border.element, body, 0, {}, inside});
         }
       }
     }
     return divide(conic, low, high, first, last);
+  }
+
+  /// The same for a facet and a band that is parallel to it: two lines. Up to kOfPlaces, what they turn is rounding.
+  bool cross_parallel_band(int body, double slope) {
+    const Plane& plane = work_.sides[body].facets[features_[body]].plane;
+    const Side& side = work_.sides[1 - body];
+    const Band& band = side.bands[features_[1 - body] - side.first_band()];
+    const double height = signed_distance(plane, band.foot), depth = side.r - std::abs(height);
+    if (-depth > std::abs(slope) * extent_ + tie_) return true;
+    if (wide_ || std::abs(slope) > kOfPlaces || !(depth > tie_)) return false;
+    const double width = std::sqrt(depth * (side.r + std::abs(height)));
+    return add_two_lines(band, unit(plane.normal - slope * band.along), -height, width, side.r / width);
+  }
+
+  /// Adds two lines along a band, at `level` from its axis in the direction `x`, and at `width` beside that.
+  bool add_two_lines(const Band& band, Vec3 x, double level, double width, double loss) {
+    const Vec3 y = overlapper::cross(band.along, x);
+    Curve line{};
+    line.kind = Curve::Kind::kLine, line.x = band.along, line.loss = loss;
+    for (const double sign : {1.0, -1.0}) {
+      line.start = band.foot + level * x + sign * width * y;
+      if (!add_line(line)) return false;
+    }
+    return true;
   }
 
   /// How deep the sphere of a patch reaches below the plane of a facet of another body.
@@ -536,7 +580,7 @@ class TwoRounded {
 
   static void circle(Curve& conic, Vec3 centre, Vec3 axis, double radius) {
     conic.kind = Curve::Kind::kConic;
-    const Vec3 x = any_orthogonal(axis);
+    const Vec3 x = beside(axis);
     conic.start = centre, conic.x = radius * x, conic.y = radius * overlapper::cross(axis, x);
   }
 
@@ -595,8 +639,14 @@ class TwoRounded {
     if (!(sine > kAlikeAxes)) {
       // The nearest points of the segments of both axes may be anywhere.
       const Vec3 across = apart - dot(apart, band.along) * band.along;
-      const double farthest = std::max(std::abs(far.begin), std::abs(far.end));
-      return std::sqrt(norm2(across)) - sine * farthest > r + ball + tie_;
+      const double distance = std::sqrt(norm2(across));
+      const double turned = sine * std::max(std::abs(far.begin), std::abs(far.end)) + tie_;
+      if (distance - turned > r + ball || distance + turned + ball * sine * sine < ball - r) return true;
+      // Up to kOfPlaces, what they turn is rounding. The sections are circles.
+      const double depth = r + ball - distance, below = depth * (ball + distance - r) / (2 * distance);
+      if (wide_ || sine > kOfPlaces || !(depth > tie_) || !(distance - (ball - r) > tie_)) return false;
+      const double level = r - below, width = std::sqrt(below * (r + level));
+      return add_two_lines(band, across / distance, level, width, r * ball / (distance * width));
     }
     common = common / sine;
     const double foot = dot(overlapper::cross(apart, far.along), common) / sine;
@@ -684,7 +734,8 @@ class TwoRounded {
         const Plane& plane = work_.limits[l].plane;
         const double c = signed_distance(plane, curve.start), a = dot(plane.normal, curve.x),
                      b = dot(plane.normal, curve.y), size = std::sqrt(a * a + b * b);
-        const double middle = std::atan2(b, a), off = std::acos(-c / size);
+        const double middle = std::atan2(b, a), inside = work_.limits[l].inside;
+        const double off = inside < 0 ? std::acos(-c / size) : kPi - 2 * std::asin(std::sqrt(inside / (2 * size)));
         for (const double root : {middle - off, middle + off})
           for (const double turn : {-2 * kPi, 0.0, 2 * kPi})
             if (root + turn > low && root + turn < high) work_.roots.push_back({root + turn, l});
@@ -812,10 +863,13 @@ class TwoRounded {
       const double at = line ? dot(from, band.along) : std::atan2(dot(from, band.across), dot(from, band.middle));
       const double slope = dot(along, outward);
       if (!(std::abs(slope) > kAlike)) return false;
-      double height = 0;
+      double moment = 0;
       Terms unused;
-      for (const int i : {0, 1}) height = std::max(height, terms({i, features_[i], 1}, end, unused));
-      work_.sides[limit->body].crossings.push_back({limit->element, at, slope > 0, end.point, height});
+      for (const int i : {0, 1}) {
+        const double height = terms({i, features_[i], 1}, end, unused);
+        moment = std::max(moment, height * arm(work_.sides[i], features_[i], end.point));
+      }
+      work_.sides[limit->body].crossings.push_back({limit->element, at, slope > 0, end.point, moment});
     }
     crossed_ = true;
     const double side = forwards > 0 ? 1 : -1;
@@ -857,6 +911,15 @@ class TwoRounded {
       height = std::abs(patch.rise + patch.lever * versine) + std::sqrt(norm2(patch.aside));
     }
     return std::abs(height);
+  }
+
+  /// m: a gap in a border near a point changes the area by at most the gap times this.
+  static double arm(const Side& side, int feature, Vec3 point) {
+    const double distance = std::sqrt(norm2(point));
+    if (feature < side.first_patch()) return distance;
+    const Patch& patch = side.patches[feature - side.first_patch()];
+    // Solid angles are seen from the centre, about `toward`.
+    return std::max(distance, std::sqrt(norm2(overlapper::cross(point - patch.centre, patch.toward))));
   }
 
   /// Three times the volume that the terms of a feature add, and the sum of the sizes.
@@ -1033,7 +1096,7 @@ class TwoRounded {
       const double apart = std::sqrt(norm2(one.point - other.point));
       constexpr double kFar = 1e-9;
       if (one.element != other.element || one.leaves != other.leaves || apart > kFar * extent_) return false;
-      open_ += apart * std::max(one.height, other.height);
+      open_ += apart * std::max(one.moment, other.moment);
       const auto [from, to] = side.ends_of(one.element);
       const bool first = i == 0 || crossings[i - 1].element != one.element;
       const bool last = i + 2 == crossings.size() || crossings[i + 2].element != one.element;
@@ -1189,7 +1252,7 @@ class TwoRounded {
   bool failed_ = false;
   bool crossed_ = false;  ///< the surfaces cross
   double thrice_ = 0, size_ = 0, area_ = 0;
-  double open_ = 0;    ///< m²: sum of the gaps where crossings go on, by |x · u|
+  double open_ = 0;    ///< m³: sum of the gaps where crossings go on, by their moments
   double border_ = 0;  ///< m: length of all crossings, by their loss
   double raised_ = 0;  ///< m²: the same, by |x · u| too
   double reach_ = 0;   ///< m: bound of |x| on crossings
@@ -1291,7 +1354,7 @@ bool place_features(double slack, const Bounds& other, Side& side) {
     Bounds box = kNothing;
     double bulge = 0;
     if (side.revolved()) {
-      band.along = axis, band.middle = any_orthogonal(band.along), band.half = kPi;
+      band.along = axis, band.middle = beside(axis), band.half = kPi;
       box = {-around_axis, around_axis};
     } else {
       const OffsetSurface::Edge& edge = side.surface->edges[e];
