@@ -690,8 +690,10 @@ class TwoRounded {
     }
     for (const double turn : {-2 * kPi, 0.0, 2 * kPi}) {
       const double from = std::max(start + turn, -kPi), to = std::min(end + turn, kPi);
-      if (!(from < to)) continue;
-      Limit first = from > -kPi ? low : kSeam, last = to < kPi ? high : kSeam;
+      // In aligned bodies, a band may begin or end where ψ does, up to rounding.
+      constexpr double kSame = 16 * kUnit;
+      if (!(to - from > kSame)) continue;
+      Limit first = start + turn > -kPi - kSame ? low : kSeam, last = end + turn < kPi + kSame ? high : kSeam;
       if (!quartic.closed) {
         for (const double sign : {1.0, -1.0}) {
           quartic.sign = sign;
