@@ -217,10 +217,11 @@ struct At {
 
 /// Where two features cross, as a function of a parameter s.
 struct Curve {
-  enum class Kind { kLine, kConic, kQuartic };
+  enum class Kind { kLine, kLong, kConic, kQuartic };
   Kind kind;
   /// start + s x, or start + cos s x + sin s y.
   Vec3 start, x, y;
+  /// A long curve is start + s e + r u, for u = cos ψ x + sin ψ y and cos ψ = p + p1 s.
   /// A quartic is start + r u + t e, for u = cos ψ x + sin ψ y. With S = sin² ψ/2, t is `slant` sin ψ ± `stretch` times
   /// √((p − p1 S) (q + q1 S)). On a closed curve, sin ψ/2 = κ sin s, with p = p1 κ². Otherwise ψ = 2 s.
   Vec3 e;
@@ -229,7 +230,10 @@ struct Curve {
   double loss = 1;  ///< error of a point, relative to that of a place
 
   At operator()(double s) const {
-    return kind == Kind::kLine ? At{start + s * x, x} : (*this)(std::sin(s), std::cos(s));
+    if (kind == Kind::kLine) return {start + s * x, x};
+    if (kind != Kind::kLong) return (*this)(std::sin(s), std::cos(s));
+    const double c = p + p1 * s, w = sign * std::sqrt((1 - c) * (1 + c));
+    return {start + s * e + r * (c * x + w * y), e + r * p1 * (x - c / w * y)};
   }
   At operator()(double sine, double cosine) const {
     if (kind == Kind::kConic) return {start + cosine * x + sine * y, cosine * y - sine * x};
@@ -486,6 +490,7 @@ class TwoRounded {
       const Band& band = side.bands[feature - side.first_band()];
       const double slope = dot(plane.normal, band.along);
       if (std::abs(slope) < kAlike) return cross_parallel_band(body, slope);
+      if (std::abs(slope) < kAlikeAxes && crosses_along(body, slope)) return cross_along(body, slope);
       conic.loss = 1 / std::abs(slope);
       const auto along_plane = [&](Vec3 way) { return way - dot(plane.normal, way) / slope * band.along; };
       conic.start = band.foot - signed_distance(plane, band.foot) / slope * band.along;
@@ -534,9 +539,47 @@ class TwoRounded {
     const Band& band = side.bands[features_[1 - body] - side.first_band()];
     const double height = signed_distance(plane, band.foot), depth = side.r - std::abs(height);
     if (-depth > std::abs(slope) * extent_ + tie_) return true;
-    if (wide_ || std::abs(slope) > kOfPlaces || !(depth > tie_)) return false;
+    if (wide_ || !(depth > tie_)) return false;
+    if (std::abs(slope) > kOfPlaces) return crosses_along(body, slope) && cross_along(body, slope);
     const double width = std::sqrt(depth * (side.r + std::abs(height)));
     return add_two_lines(band, unit(plane.normal - slope * band.along), -height, width, side.r / width);
+  }
+
+  /// True if the plane of a facet cuts both ends of a band, and more than it turns on the way.
+  bool crosses_along(int body, double slope) const {
+    const Plane& plane = work_.sides[body].facets[features_[body]].plane;
+    const Side& side = work_.sides[1 - body];
+    const Band& band = side.bands[features_[1 - body] - side.first_band()];
+    const double height = signed_distance(plane, band.foot);
+    const double farthest = std::max(std::abs(height + slope * band.begin), std::abs(height + slope * band.end));
+    return !wide_ && side.r - farthest > std::abs(slope) * (side.r + band.end - band.begin) + tie_;
+  }
+
+  /// Adds the two curves in which a facet crosses a band that is nearly parallel to it.
+  bool cross_along(int body, double slope) {
+    const Plane& plane = work_.sides[body].facets[features_[body]].plane;
+    const Side& side = work_.sides[1 - body];
+    const int e = features_[1 - body] - side.first_band();
+    const Band& band = side.bands[e];
+    const double height = signed_distance(plane, band.foot), across = std::sqrt((1 - slope) * (1 + slope));
+    work_.limits.clear();
+    if (!side.revolved())
+      for (const Border& line : {side.lines[2 * e], side.lines[2 * e + 1]})
+        work_.limits.push_back({{-line.plane.normal, -line.plane.offset}, line.element, 1 - body});
+    append_limits(body, features_[body], true);
+    if (work_.sides[body].discs) work_.limits.push_back(rim(body, features_[body]));
+    Curve curve{};
+    curve.kind = Curve::Kind::kLong, curve.start = band.foot, curve.e = band.along, curve.r = side.r;
+    curve.x = unit(plane.normal - slope * band.along), curve.y = overlapper::cross(band.along, curve.x);
+    curve.p = -height / (side.r * across), curve.p1 = -slope / (side.r * across);
+    const double most = std::max(std::abs(curve.p + curve.p1 * band.begin), std::abs(curve.p + curve.p1 * band.end));
+    curve.loss = 1 / std::sqrt((1 - most) * (1 + most));
+    const Limit first{{}, side.ends[2 * e].element, 1 - body}, last{{}, side.ends[2 * e + 1].element, 1 - body};
+    for (const double sign : {1.0, -1.0}) {
+      curve.sign = sign;
+      if (!divide(curve, band.begin, band.end, first, last)) return false;
+    }
+    return true;
   }
 
   /// Adds two lines along a band, at `level` from its axis in the direction `x`, and at `width` beside that.
@@ -774,7 +817,7 @@ class TwoRounded {
     const double step = (high - low) / parts, sine = std::sin(step), cosine = std::cos(step);
     double s = std::sin(low), c = std::cos(low);
     for (int i = 0; i <= parts; ++i) {
-      samples[i] = curve(s, c);
+      samples[i] = curve.kind == Curve::Kind::kLong ? curve(low + i * step) : curve(s, c);
       const double next = s * cosine + c * sine;
       c = c * cosine - s * sine, s = next;
     }
@@ -783,6 +826,7 @@ class TwoRounded {
       const Limit& limit = work_.limits[l];
       const size_t before = work_.roots.size();
       double height = limit.height(samples[0].point), rise = limit.slope(samples[0].point, samples[0].rate);
+      double least = std::abs(height);
       for (int i = 0; i < parts; ++i) {
         const double next = limit.height(samples[i + 1].point),
                      next_rise = limit.slope(samples[i + 1].point, samples[i + 1].rate);
@@ -790,9 +834,11 @@ class TwoRounded {
         const bool steady = height > 0 ? next > 0 && !(rise < 0 && next_rise > 0)
                                        : height < 0 && next < 0 && !(rise > 0 && next_rise < 0);
         if (!steady) find_root(curve, limit, l, place(i), samples[i], place(i + 1), samples[i + 1], 0);
-        height = next, rise = next_rise;
+        height = next, rise = next_rise, least = std::min(least, std::abs(next));
       }
       if (work_.roots.size() > before) work_.doubtful.push_back(l);
+      // A long curve may run along its limit.
+      else if (curve.kind == Curve::Kind::kLong && least < tie_) failed_ = true;
       else if (height > 0) return false;
     }
     return true;
@@ -973,7 +1019,7 @@ class TwoRounded {
       for (const double s : {low, high}) reach_ = std::max(reach_, std::sqrt(norm2(curve(s).point)));
       return true;
     }
-    const double span = high - low;
+    const double span = curve.kind == Curve::Kind::kLong ? 0 : high - low;
     if (span < 0.8 && by(slicing::kNodes8, curve, low, high, targets)) return true;
     if (span < 1.6 && by(slicing::kNodes16, curve, low, high, targets)) return true;
     if (by(slicing::kNodes32, curve, low, high, targets)) return true;
@@ -998,8 +1044,9 @@ class TwoRounded {
     for (const slicing::Node& node : rule) {
       const double step = half * (1 - 2 * node.fraction), weight = node.weight / node.sine;
       const double s = std::sin(step), c = std::cos(step);
-      const At below = curve(sine * c - cosine * s, cosine * c + sine * s);
-      const At above = curve(sine * c + cosine * s, cosine * c - sine * s);
+      const bool turns = curve.kind != Curve::Kind::kLong;
+      const At below = turns ? curve(sine * c - cosine * s, cosine * c + sine * s) : curve(middle - step);
+      const At above = turns ? curve(sine * c + cosine * s, cosine * c - sine * s) : curve(middle + step);
       const double before = weight * std::sqrt(norm2(below.rate)), after = weight * std::sqrt(norm2(above.rate));
       length += before + after;
       farthest = std::max({farthest, norm2(below.point), norm2(above.point)});
