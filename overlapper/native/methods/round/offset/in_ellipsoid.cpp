@@ -34,18 +34,19 @@ struct Share {
   double length = 0;  ///< m
   Vec3 places;        ///< m: ∫ of the place from the point; seen
   double off = 0;     ///< m²: ∫ of the distance from the point
-  double doubt = 0;   ///< m³: what rounding of its direction, and gaps of it, may add to three times the cones
+  double doubt = 0;   ///< m³: what rounding of its places and direction, and gaps, may add to three times the cones
+  double gaps = 0;    ///< m²: the area vectors that these gaps leave
 
   Share& operator+=(const Share& other) {
     value += other.value, size += other.size, area += other.area, force += other.force;
-    length += other.length, places += other.places, off += other.off, doubt += other.doubt;
+    length += other.length, places += other.places, off += other.off, doubt += other.doubt, gaps += other.gaps;
     return *this;
   }
 };
 Share operator*(double factor, const Share& s) {
   const double positive = std::abs(factor);
-  return {factor * s.value,    positive * s.size,   factor * s.area,  factor * s.force,
-          positive * s.length, positive * s.places, positive * s.off, positive * s.doubt};
+  return {factor * s.value,    positive * s.size, factor * s.area,    factor * s.force, positive * s.length,
+          positive * s.places, positive * s.off,  positive * s.doubt, positive * s.gaps};
 }
 
 /// The cones from a point over a part of a unit sphere, as an integral along the border of the part. Directions are u,
@@ -79,6 +80,16 @@ struct Pole {
     const double apart2 = norm2(apart), divisor = 1 / std::abs(2 - apart2 / 2);
     const double height = over ? (std::abs(slack) + length / 4 * apart2) * divisor : divisor + norm(point) / 2;
     return std::sqrt(apart2) * height;
+  }
+  /// The most that the integral changes if its border moves off the sphere, for the length and the distance. It is
+  /// ∮ φ a·(w × dw) − x·(w × dw) / 2 for w = u − a, and φ(w²) has the numerator `slack` + length w² / 4 or 1. A
+  /// displacement δ along u adds ∮ 2 φ a·m + 2 φ' w² (a·m + w·m / 2) − x·m for m = δ u × dw. |a·m| and |w·m| are at
+  /// most δ |w| |dw|.
+  double spread(Vec3 apart) const {
+    const double apart2 = norm2(apart), divisor = 1 / std::abs(2 - apart2 / 2);
+    const double height = (over ? std::abs(slack) + length / 4 * apart2 : 1) * divisor;
+    const double rate = ((over ? length / 4 : 0) + height / 2) * divisor;
+    return std::sqrt(apart2) * (2 * height + 3 * rate * apart2) + (over ? 0 : norm(point));
   }
 };
 
@@ -203,7 +214,7 @@ void divide(Quartic& polynomial, double root) {
 
 /// Sizes of the terms of an excess, and of half its derivative along a border.
 struct Sizes {
-  double excess = 0, slope = 0;
+  double places = 0, excess = 0, slope = 0;
 };
 
 /// A vector as a polynomial of degree 2.
@@ -296,13 +307,6 @@ class InStretched {
   bool crossed() const { return crossed_; }
   bool poking() const { return poking_; }  ///< the ellipsoid certainly pokes out of the rounded hull
   const Integrated& sum() const { return sum_; }
-  /// m: how far the places of both surfaces may be off by rounding, if their border is so far from the point.
-  double misplaced(double to_border) const {
-    const double seen = to_border / h_.z;
-    // Two bounds: one by sizes, one by the terms of the excess. Most of these terms are small in a shallow contact.
-    return kOfPlaces *
-           std::max(farthest_, std::min(to_border, h_.x * (slope_ * seen + std::abs(excess_) + seen * seen)));
-  }
   /// m³: the same of gaps between features, which rounding moves along the surface.
   double gaps(double border, double to_border) const {
     return kOfPlaces * std::max(lateral_, to_border) * border * height_;
@@ -388,9 +392,22 @@ class InStretched {
     share.off = share.length * std::sqrt(norm2(scaled(h_, from_point)));
     return share;
   }
-  /// The most that a piece of the ball's border may add. Its length is seen.
-  double ball_doubt(Vec3 from_point, double length) const {
-    return abc_ * ball_.lever(from_point + from_pole_) * length;
+  /// Adds the most that a piece of the ball's border may add. Its length is seen.
+  void doubt(Share& share, Vec3 from_point, double length) const {
+    share.doubt += abc_ * ball_.lever(from_point + from_pole_) * length;
+    share.gaps += abc_ / (2 * h_.z) * norm(from_point) * length;
+  }
+  /// The most that three times the cones change if a piece of the line in which both surfaces cross moves, and its
+  /// excess changes by `excess`. Along the feature, the piece sweeps an area, which both surfaces share but for a strip
+  /// across the ball. The cone over the strip has the distance from the point as its height.
+  double ball_moved(Vec3 from_point, double length, double excess) const {
+    return abc_ * length * (norm(from_point) + ball_.spread(from_point + from_pole_)) * excess / 2;
+  }
+  /// The same if a place of it is off by so much, seen.
+  double ball_off(Vec3 from_point, double length, double off) const {
+    const Vec3 apart = from_point + from_pole_;
+    const double height = ball_.over ? std::abs(ball_.slack) + norm2(apart) : 1 + norm(point_);
+    return abc_ * length * (height + ball_.spread(apart)) * off;
   }
   /// A part of the border of a vertex's part of its sphere.
   Share corner_share(const StretchedCorner& corner, Vec3 apart, Vec3 slope) const {
@@ -413,8 +430,8 @@ class InStretched {
     }
     if (work_.edges_apart[&edge - surface_.edges.data()]) return true;
     const StretchedCorner &from = corner_at(edge.from), &to = corner_at(edge.to);
-    WideVector along_exactly, to_point_exactly;
-    DoubleDouble slack_exactly;
+    WideVector along_exactly, line_exactly;
+    DoubleDouble apart_exactly;
     Vec3 e, line;                  // the direction, and from the point to the line of the edge
     double low_end, apart, slack;  // along the edge from the foot of the point
     if (wide_) {
@@ -423,8 +440,8 @@ class InStretched {
       const WideVector across = from.exactly - first * along;
       const DoubleDouble distance = overlapper::norm(across);
       e = rounded(along), line = rounded(across), low_end = first.head, apart = distance.head;
-      slack_exactly = DoubleDouble{r_} - distance, slack = slack_exactly.head;
-      along_exactly = along, to_point_exactly = -(DoubleDouble{1} / distance * across);
+      slack = (DoubleDouble{r_} - distance).head;
+      along_exactly = along, line_exactly = across, apart_exactly = distance;
     } else {
       e = turn_ * edge.along, low_end = dot(from.apart, e), line = from.apart - low_end * e;
       apart = std::sqrt(norm2(line)), slack = r_ - apart;
@@ -444,18 +461,30 @@ class InStretched {
         middle = to_point, across = beside, base = slack * to_point, by_slack = true;
       }
     }
-    const double size = apart + r_;
+    double height_at_middle = dot(line, middle) + r_;
+    WideVector middle_exactly, base_exactly;
+    if (wide_) {
+      const WideVector reference = wide(middle);
+      middle_exactly = by_slack ? -(DoubleDouble{1} / apart_exactly * line_exactly)
+                                : overlapper::unit(reference - dot(reference, along_exactly) * along_exactly);
+      base_exactly = by_slack ? (DoubleDouble{r_} - apart_exactly) * middle_exactly
+                              : line_exactly + DoubleDouble{r_} * middle_exactly;
+      if (!by_slack) {
+        middle = rounded(middle_exactly), across = rounded(cross(along_exactly, middle_exactly));
+        base = rounded(base_exactly), height_at_middle = dot(base_exactly, middle_exactly).head;
+      }
+    }
     const Vec3 seen = over(base, h_), a = over(e, h_);
-    const double a2 = norm2(a), height_at_middle = dot(line, middle) + r_;
+    const double a2 = norm2(a);
     // The direction is u = middle + 2 (t across − t² middle) / (1 + t²).
     const VectorSquare p{seen, 2 * scaled(k_, across), seen - 2 * scaled(k_, middle)};
     // p · point, and a · point. In a shallow contact, both are small differences.
     std::array<double, 3> y = p.along(point_);
     double slant = dot(a, point_);
-    if (wide_ && by_slack) {
-      const DoubleDouble of_middle = dot(steepness_, to_point_exactly), twice{2 * r_};
-      y = {(slack_exactly * of_middle).head, (twice * dot(steepness_, cross(along_exactly, to_point_exactly))).head,
-           ((slack_exactly - twice) * of_middle).head};
+    if (wide_) {
+      const DoubleDouble twice{2 * r_}, first = dot(steepness_, base_exactly);
+      y = {first.head, (twice * dot(steepness_, cross(along_exactly, middle_exactly))).head,
+           (first - twice * dot(steepness_, middle_exactly)).head};
       slant = dot(steepness_, along_exactly).head;
     }
     const auto excess_of = [&](double end) {
@@ -509,12 +538,7 @@ class InStretched {
         if (!(foot > low_end * a2 && foot < high_end * a2)) continue;
       }
       if (!from_in || !to_in) crossed_ = true;
-      if (by_slack) {
-        slope_ = std::max(slope_, std::sqrt(slant * slant + y[1] * y[1] / (4 * r_ * r_)) * h_.x);
-        height_ = std::max(height_, std::abs(slack)), lateral_ = std::max(lateral_, r_);
-      } else {
-        farthest_ = std::max(farthest_, size);
-      }
+      if (by_slack) height_ = std::max(height_, std::abs(slack)), lateral_ = std::max(lateral_, r_);
       // The square of half a chord is a product, with a factor for a root at an end, or just beyond.
       Quartic rest = chord;
       double to_before = -1, to_after = -1;
@@ -536,7 +560,8 @@ class InStretched {
         const double places = scale * (size0 + once * (size1 + once * size2)) + along_line * length;
         const double turning = scale * (size1 + 2 * once * (size2 + size0)) + 2 * once * along_line * length;
         Sizes sizes;
-        if (wide_ && by_slack) {
+        sizes.places = places;
+        if (wide_) {
           const double heights = scale * (std::abs(y[0]) + once * (std::abs(y[1]) + once * std::abs(y[2])));
           const double heights_turning = scale * (std::abs(y[1]) + 2 * once * (std::abs(y[0]) + std::abs(y[2])));
           sizes.excess = places * places + 2 * (heights + along_line * std::abs(slant)) + std::abs(excess_);
@@ -555,7 +580,7 @@ class InStretched {
           if (is_last ? to_in : from_in) continue;
           const double at = ((is_last ? root : -root) - pa) / a2, rounding = kOfPlaces * sizes_of(t, at).excess;
           const double gap = std::min(rounding / root, std::sqrt(rounding / a2));
-          sum_.total.doubt += ball_doubt(scale * p.at(t) + at * a, gap * length);
+          doubt(sum_.total, scale * p.at(t) + at * a, gap * length);
         }
       };
       const std::array<double, 4> half_slope{q[1] / 2, q[2], 3 * q[3] / 2, 2 * q[4]};
@@ -573,8 +598,9 @@ class InStretched {
         const double more = by_slack ? apart * sine * t : dot(line, moved);
         const double area = 2 * scale * r_ * (last - first);
         Share share;
-        share.value = area * (least + more),
-        share.size = area * (by_slack ? std::abs(least) + std::abs(more) : std::abs(least + more) + r_);
+        share.value = area * (least + more), share.size = area * (by_slack ? std::abs(least) + std::abs(more)
+                                                                  : wide_  ? std::abs(least) + apart * norm(moved)
+                                                                           : std::abs(least + more) + r_);
         share.area = area, share.force = area * (middle + moved);
         const auto on_line = [&](double at, double signed_root) {
           const Vec3 z = scale * p.at(t) + at * a, turning = scaled(k_, slope);
@@ -583,7 +609,17 @@ class InStretched {
                               at * (2 * t * slicing::value(along, t) + (1 + t * t) * (along[1] + 2 * t * along[2])) +
                               2 * a2 * at * at * t * (1 + t * t);
           Share border = ball_share(z, turning - scale * scale * rise / signed_root * a);
-          if (root > 0) border.doubt = ball_doubt(z, kOfPlaces * scale * sizes_of(t, at).slope / root * length);
+          const Sizes sizes = sizes_of(t, at);
+          if (root > 0) doubt(border, z, kOfPlaces * scale * sizes.slope / root * length);
+          if (wide_) {
+            const double along_border = norm(turning - scale * scale * rise / signed_root * a);
+            border.doubt += ball_moved(z, along_border, kOfPlaces * sizes.excess);
+            if (!by_slack) {
+              // The band and the ball round the same place in two ways, relative to the distance of the band.
+              border.doubt += ball_off(z, along_border, kOfPlaces * sizes.places) +
+                              kOfPlaces * (apart + r_) * std::abs(least + more) * border.length;
+            }
+          }
           return border;
         };
         if (!from_in) {
@@ -656,10 +692,8 @@ class InStretched {
     };
     const auto plain = [](const std::array<DoubleDouble, 2>& at) { return Point{at[0].head, at[1].head}; };
     const auto excess_at = [&](Point at) { return norm2(at) + 2 * dot(beside, at) - inside; };
-    const auto use = [&] {
-      slope_ = std::max(slope_, std::sqrt(norm2(beside))), height_ = std::max(height_, std::abs(height));
-    };
     const Vec3 foot = above * normal;
+    const double to_middle = std::sqrt(norm2(beside));
     const double of_inside = std::abs(excess_) + std::abs(above) * (std::abs(above) + 2 * norm(point_));
     double area = 0;
     bool around = true, any = false;
@@ -693,7 +727,7 @@ class InStretched {
           const double terms = wide_ ? norm2(at) + 2 * to_at + of_inside : within * within + 1;
           const double rounding = kOfPlaces * terms;
           const double gap = std::min(rounding * std::sqrt(d2) / root, std::sqrt(rounding));
-          sum_.total.doubt += ball_doubt(foot + (at.x * x + at.y * y), gap);
+          doubt(sum_.total, foot + (at.x * x + at.y * y), gap);
         };
         if (!in) add_end(first, false);
         if (!stays) add_end(last, true);
@@ -704,7 +738,7 @@ class InStretched {
     // An arc of the disc's border, where the facet is on the left and the ball's part on the right.
     const auto add_arc = [&](Point begin, double angle) {
       crossed_ = true;
-      use();
+      height_ = std::max(height_, std::abs(height));
       const Point arm = begin + beside;
       const int parts = 1 + static_cast<int>(angle);
       const double most = std::tan(angle / parts / 2);
@@ -718,7 +752,12 @@ class InStretched {
           const double scale = 2 / (1 + t * t), s = t * scale, c = t * s;
           const Point at{start.x - c * own.x - s * own.y, start.y - c * own.y + s * own.x};
           const Point slope{scale * (-s * own.x - (1 - c) * own.y), scale * (-s * own.y + (1 - c) * own.x)};
-          Share share = -1.0 * ball_share(foot + (at.x * x + at.y * y), slope.x * x + slope.y * y);
+          const Vec3 z = foot + (at.x * x + at.y * y);
+          Share share = -1.0 * ball_share(z, slope.x * x + slope.y * y);
+          if (wide_) {
+            const double once = std::sqrt(norm2(at)), terms = once * (once + 2 * to_middle) + of_inside;
+            share.doubt += ball_moved(z, std::sqrt(norm2(slope)), kOfPlaces * terms);
+          }
           const double more = to_area * cross(at, slope) / 2;
           share.value += height * more, share.size += std::abs(height * more);
           share.area += more, share.force += more * n;
@@ -854,8 +893,15 @@ class InStretched {
         const double root = half * std::sin(angle) * std::sqrt(std::max(0.0, rest)) + slicing::value(turned, s);
         return s * n + ((-a * b + root * side) / slope) * p + ((-a * side - root * b) / slope) * m;
       };
-      const auto doubt = [&](Vec3 w, double length) {
-        return r_ * r_ * r_ * corner.pole.lever(w) * length + ball_doubt(corner.base + scaled(k_, w), k_.z * length);
+      const auto add_doubt = [&](Share& share, Vec3 w, double off) {
+        share.doubt += r_ * r_ * r_ * corner.pole.lever(w) * off;
+        doubt(share, corner.base + scaled(k_, w), k_.z * off);
+      };
+      // m: how far places may be off by rounding, at a distance from the point. Two bounds: one by sizes, one by the
+      // terms of the excess. Most of these terms are small in a shallow contact.
+      const auto misplaced = [&](double seen) {
+        const double slope = norm(aside) / k_.x, by_excess = h_.x * (slope * seen + std::abs(excess_) + seen * seen);
+        return kOfPlaces * std::max(corner.pole.over ? 0 : norm(corner.apart) + r_, std::min(h_.x * seen, by_excess));
       };
       const auto of_line = [&](double angle) {
         const double s = middle - half * std::cos(angle), root = std::sqrt(std::max(0.0, slicing::value(loop.rest, s)));
@@ -865,13 +911,15 @@ class InStretched {
         const double away = norm(w);
         const double rounding = kOfPlaces * (terms * away * (1 + away) + terms_aside) / root;
         // The derivative of s is known, too.
-        share.doubt = doubt(w, rounding + std::abs(dot(n, slope) - half * std::sin(angle)));
+        add_doubt(share, w, rounding + std::abs(dot(n, slope) - half * std::sin(angle)));
+        if (wide_) share.doubt += 3 * misplaced(norm(corner.base + scaled(k_, w))) * share.off;
         return share;
       };
       const auto add = [&](double begin, double end) {
         crossed_ = true;
-        if (!corner.pole.over) farthest_ = std::max(farthest_, norm(corner.apart) + r_);
-        slope_ = std::max(slope_, std::sqrt(norm2(aside)) / k_.x);
+        // A height above the point is a difference, which loses digits of its terms.
+        if (wide_ && !corner.pole.over)
+          sum_.total.doubt += 3 * kOfPlaces * (norm(corner.apart) + r_) * r_ * r_ * surface_.vertices[v].solid_angle;
         height_ = std::max(height_, std::abs(corner.pole.slack * r_)), lateral_ = std::max(lateral_, r_);
         const int parts = 1 + static_cast<int>((end - begin) / 2);
         for (int part = 0; part < parts; ++part)
@@ -884,7 +932,7 @@ class InStretched {
       while (next < crossings.size() && crossings[next].loop == i) ++next;
       const auto on_loop = crossings.subspan(begin, next - begin);
       for (const Crossing& crossing : on_loop)
-        sum_.total.doubt += doubt(crossing.apart, norm(apart(crossing.place) - crossing.apart));
+        add_doubt(sum_.total, crossing.apart, norm(apart(crossing.place) - crossing.apart));
       if (on_loop.empty()) {
         // The whole loop is in the vertex's part of the sphere, or nothing of it.
         double surest = 0;
@@ -935,8 +983,6 @@ class InStretched {
   WideVector steepness_;    ///< 1/m: the point over the half axes
   WideVector exact_point_;  ///< m
   // The next numbers are the largest of all features that are used.
-  double farthest_ = 0;              ///< m: sizes of numbers that places are sums of, if they are not exact
-  double slope_ = 0;                 ///< of the ball, where the feature is nearest to the point
   double height_ = 0, lateral_ = 0;  ///< m: heights above the point, and sizes along the surface
   Integrated sum_;
 };
@@ -1014,13 +1060,12 @@ std::optional<VolumeAlone> volume_in_ellipsoid(const Placed& rounded_hull, const
     double of_places = kOfPlaces * (size + h.x + r) * (total.area + border);
     if (exactly) {
       const double apart_by = norm(rounded_hull.position - ellipsoid.position);
-      const double off =
-          part.misplaced(to_border) + wide_placing(apart_by + norm(hull.origin) + reach(rounded_hull.shape), true);
+      const double off = wide_placing(apart_by + norm(hull.origin) + reach(rounded_hull.shape), true);
       of_places = off * (total.area + border) + part.gaps(total.length, to_border);
     }
     if (!roughly) {
       // A gap in the surface leaves area vectors open, beyond the rounding of their own sum.
-      const double open = norm(total.force), rounding = kOfTermsInEllipsoid * to_border * total.length;
+      const double open = norm(total.force), rounding = kOfTermsInEllipsoid * to_border * total.length + total.gaps;
       const double error = (part.sum().error + kOfTermsInEllipsoid * total.size + total.doubt) / 3 + of_places +
                            2 * std::max(0.0, open - rounding) * to_border;
       constexpr double kOpen = 1e-10;
