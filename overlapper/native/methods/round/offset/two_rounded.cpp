@@ -23,7 +23,8 @@ namespace {
 
 /// Rounding of a term, relative to its size. No term takes more than 60 operations that each may round.
 constexpr double kOfTermsOfTwo = 64 * kUnit;
-/// Rounding of a point of a crossing, relative to its distances from the origin and from centres.
+/// Rounding of a point of a crossing, relative to its distances from the origin and from centres. Of an exact curve:
+/// relative to the terms of the point.
 constexpr double kOfPlaces = 8 * kUnit;
 /// Directions that differ less have no certain cross product.
 constexpr double kAlike = 1e-7;
@@ -51,6 +52,7 @@ struct Band {
   double base = 0;               ///< m: integrals count t from here
   Vec3 toward;                   ///< w
   double rise = 0, lever = 0;
+  Vec3 near;                  ///< rise w: near the origin, it keeps the digits that foot + r w loses
   double plain = 0, cap = 0;  ///< ∫∫ 1, 1 − w · u over φ and t
   Vec3 vector;                ///< m²: ∫ u over the area
 };
@@ -60,6 +62,7 @@ struct Patch {
   Vec3 toward;             ///< w, not opposite to a normal
   bool to_origin = false;  ///< w leads from the centre to the origin
   double rise = 0, lever = 0;
+  Vec3 near;  ///< centre + r w
   Vec3 aside;
   double angle = 0, cap = 0;  ///< ∫ 1, 1 − w · u over the solid angle
   Vec3 vector;                ///< m²: ∫ u over the area
@@ -150,8 +153,11 @@ Vec3 beside(Vec3 axis) {
 }
 void aim(Band& band) {
   band.base = std::clamp(0.0, band.begin, band.end);
-  band.lever = std::sqrt(norm2(band.foot));
-  band.toward = band.lever > 0 ? -band.foot / band.lever : band.middle;
+  // If the axis passes the origin up to rounding, the foot has no certain direction.
+  const Vec3 across = band.foot - dot(band.foot, band.along) * band.along;
+  const bool beside = norm2(across) > norm2(band.foot) / 2;
+  band.toward = beside ? -unit(across) : band.middle;
+  band.lever = -dot(band.foot, band.toward);
 }
 
 /// Takes the distances of a feature from the origin from double-doubles.
@@ -169,13 +175,14 @@ void refine(int feature, Side& side) {
     const WideVector foot = begin - t * along;
     band.begin = t.head, band.end = dot(wide_corner(side, to), along).head, band.foot = side.rotation * rounded(foot);
     aim(band);
-    band.rise = (DoubleDouble{side.r} - norm(foot)).head;
+    band.rise = (DoubleDouble{side.r} - norm(foot)).head, band.near = band.rise * band.toward;
     if (!side.revolved())
       for (const int i : {2 * e, 2 * e + 1}) side.lines[i].plane.offset = dot(side.lines[i].plane.normal, band.foot);
   } else {
     const int v = feature - side.first_patch();
     Patch& patch = side.patches[v];
-    if (patch.to_origin) patch.rise = (DoubleDouble{side.r} - norm(wide_corner(side, v))).head;
+    if (!patch.to_origin) return;
+    patch.rise = (DoubleDouble{side.r} - norm(wide_corner(side, v))).head, patch.near = patch.rise * patch.toward;
   }
 }
 
@@ -228,6 +235,30 @@ struct Curve {
   double r = 0, slant = 0, stretch = 1, p = 0, p1 = 0, q = 1, q1 = 0, kappa = 1, sign = 1;
   bool closed = false;
   double loss = 1;  ///< error of a point, relative to that of a place
+  /// With a point for s = 0 or ψ = 0 in place of `start`, from double-doubles.
+  bool exact = false;
+  /// Of an exact conic: sizes of the terms of the distance from the other surface, for 1, 1 − cos s and sin s. Of an
+  /// exact quartic: 1 / (2 R) for the other radius R.
+  double constant = 0, round = 0, tilt = 0;
+
+  /// Sizes of the terms of a point, and of its distance from the other surface.
+  struct Sizes {
+    double place, off;
+  };
+  Sizes sizes(double sine, double cosine) const {
+    const double whole = std::sqrt(norm2(start));
+    if (kind == Kind::kConic) {
+      const double less = 1 - cosine, beside = std::abs(sine);
+      return {whole + less * std::sqrt(norm2(x)) + beside * std::sqrt(norm2(y)),
+              constant + less * round + beside * tilt};
+    }
+    const double half_sine = closed ? kappa * sine : sine, square = half_sine * half_sine;
+    const double w = 2 * std::abs(half_sine) * std::sqrt(std::max(0.0, 1 - square));
+    const double other = q + q1 * square, root = std::sqrt(std::max(0.0, (p - p1 * square) * other));
+    const double aside = std::abs(slant) * w, chord = std::abs(stretch) * root;
+    return {whole + r * (2 * square + w) + aside + chord,
+            constant * ((p + p1 * square) * other + 2 * root * (aside + chord) / std::abs(stretch))};
+  }
 
   At operator()(double s) const {
     if (kind == Kind::kLine) return {start + s * x, x};
@@ -236,7 +267,11 @@ struct Curve {
     return {start + s * e + r * (c * x + w * y), e + r * p1 * (x - c / w * y)};
   }
   At operator()(double sine, double cosine) const {
-    if (kind == Kind::kConic) return {start + cosine * x + sine * y, cosine * y - sine * x};
+    if (kind == Kind::kConic) {
+      // 1 − cos s without a difference
+      const double along = !exact ? cosine : cosine > 0 ? -sine * sine / (1 + cosine) : cosine - 1;
+      return {start + along * x + sine * y, cosine * y - sine * x};
+    }
     double half_sine = sine, half_cosine = cosine, turn = 2, half_rate = cosine, root, rate;
     if (closed) {
       half_sine = kappa * sine, half_cosine = std::sqrt((1 - half_sine) * (1 + half_sine));
@@ -252,13 +287,13 @@ struct Curve {
     }
     const double c = 1 - 2 * square, w = 2 * half_sine * half_cosine;
     const double t = slant * w + stretch * root, t_rate = slant * c * turn + stretch * rate;
-    return {start + r * (c * x + w * y) + t * e, r * turn * (c * y - w * x) + t_rate * e};
+    return {start + r * ((exact ? -2 * square : c) * x + w * y) + t * e, r * turn * (c * y - w * x) + t_rate * e};
   }
 };
 
 class TwoRounded {
  public:
-  /// In `wide` arithmetic, depths come from double-doubles, and signs of depths are certain beyond `off`.
+  /// In `wide` arithmetic, depths and curves come from double-doubles, and signs of depths are certain beyond `off`.
   TwoRounded(TwoWork& work, bool wide, double tie, double off, double extent)
       : work_(work), wide_(wide), tie_(tie), off_(off), extent_(extent) {}
 
@@ -299,10 +334,10 @@ class TwoRounded {
   double volume() const { return thrice_ / 3; }
   bool crossed() const { return crossed_; }
   double error() const {
-    const double reach = std::min(extent_, reach_), off_place = kOfPlaces * (largest_ + reach);
+    const double reach = std::min(extent_, reach_);
     // Rounding of places leaves area vectors that do not add up to zero, but that is not an error of the volume.
-    const double unbalanced = std::max(0.0, norm(unbalanced_) - off_place * border_);
-    return off_ * area_ + (kOfTermsOfTwo * size_ + open_ + off_place * raised_) / 3 + unbalanced * reach;
+    const double unbalanced = std::max(0.0, norm(unbalanced_) - kOfPlaces * border_ - gaps_);
+    return off_ * area_ + (kOfTermsOfTwo * size_ + open_ + kOfPlaces * raised_) / 3 + unbalanced * reach;
   }
 
  private:
@@ -505,6 +540,9 @@ class TwoRounded {
         const double most = std::sqrt(norm2(conic.x) + norm2(conic.y));
         if (distance - most > border.radius + tie_) return true;
         if (!(distance + most < border.radius - tie_)) work_.limits.push_back(border);
+      } else if (wide_) {
+        const double at = sharpen_ellipse(conic, body, feature - side.first_band());
+        low -= at, high -= at;
       }
     } else {
       const int v = feature - side.first_patch();
@@ -527,6 +565,10 @@ class TwoRounded {
           const Plane chord{normal, dot(normal, conic.start) + inside - radius};
           work_.limits.push_back({chord, border.element, body, 0, {}, inside});
         }
+      } else if (wide_) {
+        const auto [across, offset] = wide_facet(body, features_[body]);
+        const WideVector middle = side.wide_rotation * wide_corner(side, v);
+        sharpen_circle(conic, across, offset, middle, side.r, DoubleDouble{side.r} - (dot(across, middle) - offset), 0);
       }
     }
     return divide(conic, low, high, first, last);
@@ -640,6 +682,7 @@ class TwoRounded {
     Curve conic{};
     const Vec3 axis = apart / distance;
     circle(conic, from + level * axis, axis, std::sqrt(below * (a.r + level)));
+    if (wide_) sharpen_patches(conic, v, w);
     work_.limits.clear();
     append_limits(0, features_[0], true), append_limits(1, features_[1], true);
     return divide(conic, -kPi, kPi, kSeam, kSeam);
@@ -666,6 +709,7 @@ class TwoRounded {
     quartic.x = distance > tie_ ? across / distance : any_orthogonal(band.along);
     quartic.y = overlapper::cross(band.along, quartic.x);
     quartic.p1 = 4 * distance * r;
+    if (wide_) sharpen_band_and_patch(quartic, body, features_[body] - side.first_band(), v);
     return divide_quartic(quartic, body, band);
   }
 
@@ -714,7 +758,108 @@ class TwoRounded {
     const double turned = dot(quartic.y, overlapper::cross(far.along, common));
     quartic.slant = -r * turned / along, quartic.stretch = 1 / along, quartic.loss = 1 / sine;
     quartic.p = depth, quartic.p1 = 2 * r, quartic.q = ball - r + distance, quartic.q1 = 2 * r;
+    if (wide_)
+      sharpen_bands(quartic, body, features_[body] - side.first_band(), features_[1 - body] - other.first_band());
     return divide_quartic(quartic, body, band);
+  }
+
+  // ---------------------------------------------------------------------------------------------------- exact curves
+  // In a shallow contact, surfaces cross at small angles, and a curve loses what these angles lose. So they come from
+  // double-doubles, and points are sums from a point near the origin.
+
+  /// A plane or an axis, in the directions of the common coordinates.
+  std::pair<WideVector, DoubleDouble> wide_facet(int body, int f) const {
+    const WidePlane plane = wide_plane(work_.sides[body], f);
+    return {work_.sides[body].wide_rotation * plane.normal, plane.offset};
+  }
+  struct WideAxis {
+    WideVector along, foot;
+  };
+  WideAxis wide_axis(int body, int e) const {
+    const Side& side = work_.sides[body];
+    const WideVector along = side.wide_rotation * wide_along(side, e),
+                     begin = side.wide_rotation * wide_corner(side, ends_of_band(side, e).first);
+    return {along, begin - dot(begin, along) * along};
+  }
+
+  /// Of a facet and a band. The conic begins at the direction from the band's axis to the origin. Returns its angle.
+  double sharpen_ellipse(Curve& conic, int body, int e) const {
+    const auto [across, offset] = wide_facet(body, features_[body]);
+    const auto [along, foot] = wide_axis(1 - body, e);
+    const DoubleDouble distance = norm(foot), r{work_.sides[1 - body].r}, rise = r - distance;
+    const Band& band = work_.sides[1 - body].bands[e];
+    if (!(distance.head > r.head / 2)) return 0;
+    const WideVector toward = -(foot / distance), beside = overlapper::cross(along, toward);
+    const DoubleDouble by_toward = dot(across, toward), by_beside = dot(across, beside), slope = dot(across, along),
+                       left = offset - rise * by_toward;
+    const Vec3 e_rounded = rounded(along), w = rounded(toward);
+    conic.start = rise.head * w + (left / slope).head * e_rounded;
+    conic.x = r.head * (w - (by_toward / slope).head * e_rounded);
+    conic.y = r.head * (rounded(beside) - (by_beside / slope).head * e_rounded);
+    conic.constant = std::abs(left.head), conic.round = r.head * std::abs(by_toward.head),
+    conic.tilt = r.head * std::abs(by_beside.head), conic.exact = true;
+    return std::atan2(dot(w, band.across), dot(w, band.middle));
+  }
+
+  /// Of a plane and a sphere that reaches `depth` below it. `more` is 1 / r of another sphere in place of the plane.
+  void sharpen_circle(Curve& conic, const WideVector& across, DoubleDouble offset, const WideVector& centre, double r,
+                      DoubleDouble depth, double more) const {
+    const WideVector beside = centre - dot(across, centre) * across;
+    const DoubleDouble distance = norm(beside), square = depth * (DoubleDouble{2 * r} - depth);
+    const double radius = std::sqrt(square.head);
+    const Vec3 axis = rounded(across);
+    // If the centre is across the plane from the origin up to rounding, it is in no certain direction.
+    Vec3 away = distance.head > 0 ? -rounded(beside / distance) : Vec3{};
+    away = away - dot(away, axis) * axis;
+    away = norm2(away) > 0.5 ? unit(away) : any_orthogonal(axis);
+    const double inside = (distance * distance - square).head / (distance.head + radius);
+    conic.start = offset.head * axis - inside * away;
+    conic.x = radius * away, conic.y = radius * overlapper::cross(axis, away);
+    const double slope = radius * (1 / r + more);
+    conic.constant = slope * std::sqrt(norm2(conic.start)), conic.round = conic.tilt = slope * radius;
+    conic.exact = true;
+  }
+  void sharpen_patches(Curve& conic, int v, int w) const {
+    const Side &a = work_.sides[0], &b = work_.sides[1];
+    const WideVector from = a.wide_rotation * wide_corner(a, v), apart = b.wide_rotation * wide_corner(b, w) - from;
+    const DoubleDouble distance = norm(apart), depth = two_sum(a.r, b.r) - distance;
+    const DoubleDouble below =
+        depth * (DoubleDouble{b.r} + distance - DoubleDouble{a.r}) / (DoubleDouble{2} * distance);
+    const WideVector axis = apart / distance;
+    sharpen_circle(conic, axis, dot(axis, from) + (DoubleDouble{a.r} - below), from, a.r, below, 1 / b.r);
+  }
+
+  void sharpen_band_and_patch(Curve& quartic, int body, int e, int v) const {
+    const Side &side = work_.sides[body], &other = work_.sides[1 - body];
+    const auto [along, foot] = wide_axis(body, e);
+    const WideVector centre = other.wide_rotation * wide_corner(other, v), apart = centre - foot,
+                     across = apart - dot(apart, along) * along;
+    const DoubleDouble distance = norm(across), r{side.r}, ball{other.r};
+    if (!(distance.head > (r.head + ball.head) / 2)) return;
+    const WideVector way = across / distance;
+    quartic.start = rounded(centre - (distance - r) * way);
+    quartic.x = rounded(way), quartic.e = rounded(along), quartic.y = rounded(overlapper::cross(along, way));
+    quartic.p = ((ball + r - distance) * (ball - r + distance)).head, quartic.p1 = 4 * distance.head * r.head;
+    quartic.constant = 1 / (2 * ball.head), quartic.exact = true;
+  }
+  void sharpen_bands(Curve& quartic, int body, int e, int g) const {
+    const auto [along, foot] = wide_axis(body, e);
+    const auto [far, far_foot] = wide_axis(1 - body, g);
+    const DoubleDouble r{work_.sides[body].r}, ball{work_.sides[1 - body].r};
+    const WideVector both = overlapper::cross(along, far), apart = far_foot - foot;
+    const DoubleDouble sine = norm(both);
+    WideVector common = both / sine;
+    DoubleDouble distance = dot(apart, common);
+    const DoubleDouble at = dot(overlapper::cross(apart, far), common) / sine;
+    if (distance < DoubleDouble{0}) common = -common, distance = -distance;
+    if (!(distance.head > (r.head + ball.head) / 2)) return;
+    const WideVector beside = overlapper::cross(along, common), across = overlapper::cross(far, common);
+    const DoubleDouble slope = dot(along, across);
+    quartic.start = rounded(foot + at * along + r * common);
+    quartic.x = rounded(common), quartic.e = rounded(along), quartic.y = rounded(beside);
+    quartic.slant = -(r * dot(beside, across) / slope).head, quartic.stretch = (DoubleDouble{1} / slope).head;
+    quartic.p = (r + ball - distance).head, quartic.q = (ball - r + distance).head;
+    quartic.constant = 1 / (2 * ball.head), quartic.exact = true;
   }
 
   bool divide_quartic(Curve& quartic, int body, const Band& band) {
@@ -769,19 +914,29 @@ class TwoRounded {
     if (curve.kind == Curve::Kind::kConic) {
       for (int l = 0; l < planes; ++l) {
         const Plane& plane = work_.limits[l].plane;
-        const double c = signed_distance(plane, curve.start), a = dot(plane.normal, curve.x),
-                     b = dot(plane.normal, curve.y), size = std::sqrt(a * a + b * b);
+        const double a = dot(plane.normal, curve.x), b = dot(plane.normal, curve.y), size = std::sqrt(a * a + b * b);
+        const double c = signed_distance(plane, curve.start) - (curve.exact ? a : 0);
         if (std::abs(std::abs(c) - size) < tie_) return false;
         if (c > size) return true;
         if (c > -size) work_.doubtful.push_back(l);
       }
       for (const int l : work_.doubtful) {
         const Plane& plane = work_.limits[l].plane;
-        const double c = signed_distance(plane, curve.start), a = dot(plane.normal, curve.x),
-                     b = dot(plane.normal, curve.y), size = std::sqrt(a * a + b * b);
-        const double middle = std::atan2(b, a), inside = work_.limits[l].inside;
-        const double off = inside < 0 ? std::acos(-c / size) : kPi - 2 * std::asin(std::sqrt(inside / (2 * size)));
-        for (const double root : {middle - off, middle + off})
+        const double a = dot(plane.normal, curve.x), b = dot(plane.normal, curve.y);
+        const double height = signed_distance(plane, curve.start);
+        std::array<double, 2> angles;
+        if (curve.exact) {
+          // By the tangent of half an angle, near 0 without a difference.
+          const double steep = 2 * a - height, root = std::sqrt(std::max(0.0, b * b + height * steep));
+          const double sum = b + std::copysign(root, b);
+          angles = {2 * std::atan2(sum, steep), 2 * std::atan2(-height, sum)};
+        } else {
+          const double size = std::sqrt(a * a + b * b), middle = std::atan2(b, a), inside = work_.limits[l].inside;
+          const double off =
+              inside < 0 ? std::acos(-height / size) : kPi - 2 * std::asin(std::sqrt(inside / (2 * size)));
+          angles = {middle - off, middle + off};
+        }
+        for (const double root : angles)
           for (const double turn : {-2 * kPi, 0.0, 2 * kPi})
             if (root + turn > low && root + turn < high) work_.roots.push_back({root + turn, l});
       }
@@ -942,18 +1097,19 @@ class TwoRounded {
       height = facet.plane.offset;
     } else if (feature < side.first_patch()) {
       const Band& band = side.bands[feature - side.first_band()];
-      const Vec3 from = at.point - band.foot;
+      const Vec3 from = at.point - band.near;
       const double t = dot(from, band.along), minus_t = band.base - t;
-      const Vec3 out = from - t * band.along, turn = overlapper::cross(at.rate, band.along);
+      const Vec3 apart = from - t * band.along, out = apart + side.r * band.toward,
+                 turn = overlapper::cross(at.rate, band.along);
       const double rate = minus_t * dot(out, turn) / (side.r * side.r);
-      const double versine = norm2(out - side.r * band.toward) / (2 * side.r * side.r);
+      const double versine = norm2(apart) / (2 * side.r * side.r);
       result = {rate, versine * rate, minus_t * turn.x, minus_t * turn.y, minus_t * turn.z};
       height = band.rise + band.lever * versine;
     } else {
       const Patch& patch = side.patches[feature - side.first_patch()];
-      const Vec3 out = at.point - patch.centre;
-      const double versine = norm2(out - side.r * patch.toward) / (2 * side.r * side.r);
-      const double rate = dot(patch.toward, overlapper::cross(out, at.rate)) / (side.r * side.r * (2 - versine));
+      const Vec3 apart = at.point - patch.near;
+      const double versine = norm2(apart) / (2 * side.r * side.r);
+      const double rate = dot(patch.toward, overlapper::cross(apart, at.rate)) / (side.r * side.r * (2 - versine));
       const Vec3 swept = 0.5 * overlapper::cross(at.point, at.rate);
       result = {rate, versine * rate / 2, swept.x, swept.y, swept.z};
       height = std::abs(patch.rise + patch.lever * versine) + std::sqrt(norm2(patch.aside));
@@ -1009,14 +1165,16 @@ class TwoRounded {
     if (curve.kind == Curve::Kind::kLine) {
       const At from = curve(low);
       const At whole{from.point, (high - low) * from.rate};
+      double farthest = 0;
+      for (const double s : {low, high}) farthest = std::max(farthest, std::sqrt(norm2(curve(s).point)));
+      const double length = curve.loss * (high - low) * farthest;
       for (const Target& target : targets) {
         Terms term;
-        raised_ += curve.loss * (high - low) * terms(target, whole, term);
+        raised_ += length * terms(target, whole, term);
         put(target, term);
         size_ += cone(target, term).second;
       }
-      border_ += curve.loss * (high - low);
-      for (const double s : {low, high}) reach_ = std::max(reach_, std::sqrt(norm2(curve(s).point)));
+      border_ += length, reach_ = std::max(reach_, farthest);
       return true;
     }
     const double span = curve.kind == Curve::Kind::kLong ? 0 : high - low;
@@ -1039,7 +1197,7 @@ class TwoRounded {
     const double middle = (low + high) / 2, half = (high - low) / 2;
     std::array<Terms, 2> sums{}, sizes{};
     std::array<std::array<slicing::Series, kTerms>, 2> series{};
-    double length = 0, raised = 0, farthest = 0;
+    double length = 0, raised = 0, farthest = 0, exact_raised = 0, exact_length = 0;
     const double sine = std::sin(middle), cosine = std::cos(middle);
     for (const slicing::Node& node : rule) {
       const double step = half * (1 - 2 * node.fraction), weight = node.weight / node.sine;
@@ -1049,10 +1207,20 @@ class TwoRounded {
       const At above = turns ? curve(sine * c + cosine * s, cosine * c - sine * s) : curve(middle + step);
       const double before = weight * std::sqrt(norm2(below.rate)), after = weight * std::sqrt(norm2(above.rate));
       length += before + after;
+      Curve::Sizes first{}, last{};
+      if (curve.exact) {
+        first = curve.sizes(sine * c - cosine * s, cosine * c + sine * s);
+        last = curve.sizes(sine * c + cosine * s, cosine * c - sine * s);
+        // An area that a moved curve sweeps is a part of both features, but for a strip from one to the other.
+        exact_raised +=
+            before * first.off * std::sqrt(norm2(below.point)) + after * last.off * std::sqrt(norm2(above.point));
+        exact_length += before * first.place + after * last.place;
+      }
       farthest = std::max({farthest, norm2(below.point), norm2(above.point)});
       for (size_t i = 0; i < targets.size(); ++i) {
         Terms one, other;
-        raised += before * terms(targets[i], below, one) + after * terms(targets[i], above, other);
+        const double height = before * terms(targets[i], below, one), next = after * terms(targets[i], above, other);
+        raised += height + next, exact_raised += height * first.place + next * last.place;
         for (int k = 0; k < kTerms; ++k) {
           sums[i][k] += weight * (one[k] + other[k]), sizes[i][k] += weight * (std::abs(one[k]) + std::abs(other[k]));
           series[i][k].add(node, one[k], other[k]);
@@ -1074,15 +1242,17 @@ class TwoRounded {
       // A rule of n nodes integrates the first 2 n terms of the series exactly.
       if (size > 0) error += scale * tail * std::min(1.0, tail / size);
     }
-    size_ += error / kOfTermsOfTwo, border_ += curve.loss * scale * length;
-    raised_ += curve.loss * scale * raised, reach_ = std::max(reach_, std::sqrt(farthest));
+    const double away = std::sqrt(farthest), lost = curve.loss * scale * (largest_ + away);
+    size_ += error / kOfTermsOfTwo, reach_ = std::max(reach_, away);
+    border_ += curve.exact ? curve.loss * scale * exact_length : lost * length;
+    raised_ += curve.exact ? scale * exact_raised : lost * raised;
     for (size_t i = 0; i < targets.size(); ++i) {
       for (double& sum : sums[i]) sum *= scale;
       put(targets[i], sums[i]);
       // A direction from an axis or a centre loses what places lose, relative to the radius.
       const Side& side = work_.sides[targets[i].body];
-      const double lost = targets[i].feature < side.first_band() ? 0 : kOfPlaces * std::sqrt(farthest) / side.r;
-      size_ += scale * cone(targets[i], sizes[i]).second * (1 + lost / kOfTermsOfTwo);
+      const double of_direction = targets[i].feature < side.first_band() ? 0 : kOfPlaces * away / side.r;
+      size_ += scale * cone(targets[i], sizes[i]).second * (1 + of_direction / kOfTermsOfTwo);
     }
     return true;
   }
@@ -1145,7 +1315,7 @@ class TwoRounded {
       const double apart = std::sqrt(norm2(one.point - other.point));
       constexpr double kFar = 1e-9;
       if (one.element != other.element || one.leaves != other.leaves || apart > kFar * extent_) return false;
-      open_ += apart * std::max(one.moment, other.moment);
+      open_ += apart * std::max(one.moment, other.moment), gaps_ += apart * std::sqrt(norm2(one.point));
       const auto [from, to] = side.ends_of(one.element);
       const bool first = i == 0 || crossings[i - 1].element != one.element;
       const bool last = i + 2 == crossings.size() || crossings[i + 2].element != one.element;
@@ -1208,6 +1378,9 @@ class TwoRounded {
       const Terms term{dot(facet.plane.normal, swept), 0, 0, 0, 0};
       put(target, term);
       size_ += cone(target, term).second;
+      // The band ends at an angle, and the facet at a place that loses what the axis loses.
+      const double lost = (side.r + norm(band.foot)) * (to - from);
+      border_ += lost, raised_ += lost * std::abs(facet.plane.offset);
       return true;
     }
     const auto [at_begin, at_end] = ends_of_band(side, e);
@@ -1285,7 +1458,7 @@ class TwoRounded {
           size_ += square * (std::abs(patch.rise) + std::abs(patch.lever)) * (1 + patch.angle);
         }
         finish(f, {patch.angle, patch.cap, patch.vector.x, patch.vector.y, patch.vector.z}, square * patch.angle);
-        if (!patch.to_origin) raised_ += square * std::abs(patch.angle);
+        if (!patch.to_origin) raised_ += (largest_ + extent_) * square * std::abs(patch.angle);
       }
     }
   }
@@ -1302,8 +1475,9 @@ class TwoRounded {
   bool crossed_ = false;  ///< the surfaces cross
   double thrice_ = 0, size_ = 0, area_ = 0;
   double open_ = 0;    ///< m³: sum of the gaps where crossings go on, by their moments
-  double border_ = 0;  ///< m: length of all crossings, by their loss
-  double raised_ = 0;  ///< m²: the same, by |x · u| too
+  double gaps_ = 0;    ///< m²: the same, by |x| alone
+  double border_ = 0;  ///< m²: length of all crossings, by the sizes that places lose digits of, and by their loss
+  double raised_ = 0;  ///< m³: the same, by |x · u| too
   double reach_ = 0;   ///< m: bound of |x| on crossings
   Vec3 unbalanced_;    ///< m²
 };
@@ -1355,8 +1529,9 @@ void keep_near(Vec3 normal, double most, Side& side) {
   for (size_t v = 0; v < side.vertices.size(); ++v) side.near[v] = dot(normal, side.vertices[v]) - side.r <= most;
 }
 
-/// Places the features that may reach the box `other`. False if the normals of a vertex are spread too far.
-bool place_features(double slack, const Bounds& other, Side& side) {
+/// Places the features that may reach the box `other`. The other body reaches at most `depth` below the plane across
+/// `outward` that the side touches. False if the normals of a vertex are spread too far.
+bool place_features(double slack, const Bounds& other, Vec3 outward, double depth, Side& side) {
   const double r = side.r;
   const int facets = side.discs ? 2 : side.revolved() ? 0 : static_cast<int>(side.surface->facets.size());
   const int bands = side.revolved() ? 1 : static_cast<int>(side.surface->edges.size());
@@ -1430,7 +1605,7 @@ bool place_features(double slack, const Bounds& other, Side& side) {
     }
     if (!kept) continue;
     aim(band);
-    band.rise = r - band.lever;
+    band.rise = r - band.lever, band.near = band.rise * band.toward;
   }
   for (int v = 0; v < patches; ++v) {
     if (!side.near[v]) continue;
@@ -1461,11 +1636,14 @@ bool place_features(double slack, const Bounds& other, Side& side) {
     // No integral about a direction is certain if a normal is nearly opposite to it.
     constexpr double kOppositeToPole = -0.9, kFarOff = 0.5, kSpread = -0.3;
     if (least < kOppositeToPole) return false;
-    if (dot(toward, pole) > kFarOff && least > kSpread) {
+    // In a shallow contact, normals are near `outward`.
+    const bool shallow = depth + slack < r / 2 && dot(toward, outward) > kFarOff;
+    if (shallow || (dot(toward, pole) > kFarOff && least > kSpread)) {
       patch.to_origin = true, patch.toward = toward, patch.lever = distance, patch.rise = r - distance;
+      patch.near = patch.rise * toward;
     } else {
       patch.toward = pole, patch.lever = -dot(patch.centre, pole), patch.rise = r - patch.lever;
-      patch.aside = patch.centre + patch.lever * pole;
+      patch.aside = patch.centre + patch.lever * pole, patch.near = patch.centre + r * pole;
     }
   }
   std::ranges::sort(side.around, {}, [](const Around& around) { return around.box.lower.x; });
@@ -1488,50 +1666,59 @@ std::optional<VolumeAlone> volume_of_two_rounded(const Placed& a, const Placed& 
     const Bounds of_a = bounds(a), of_b = bounds(b);
     origin = 0.5 * (max(of_a.lower, of_b.lower) + min(of_a.upper, of_b.upper));
   }
-  // The origin has exact coordinates in the first body's core.
-  const Vec3 inner = apply_transposed(a.pose.rotation, origin - a.pose.translation);
-  for (const int i : {0, 1}) sides[i].wide_rotation = wide_rotation(bodies[i]->orientation);
-  const WideVector in_other =
-      apply_transposed(sides[1].wide_rotation, sides[0].wide_rotation * (wide(inner) + wide(data_origin(a.shape))) +
-                                                   wide_difference(a.position, b.position)) -
-      wide(data_origin(b.shape));
-  start(a, wide(inner), sides[0]), start(b, in_other, sides[1]);
-  const double magnitude = reach(a, reach(b, size)), rounded_off = rounding(magnitude), slack = 4 * rounded_off;
-  const Bounds common{max(sides[0].bounds.lower, sides[1].bounds.lower),
-                      min(sides[0].bounds.upper, sides[1].bounds.upper)};
-  const double extent = norm(common.upper - common.lower);
-  // No point of a body is beyond its own plane across this direction.
-  const Vec3 way = between ? a.tightest(origin).normal : unit(b.pose.translation - a.pose.translation);
-  const double highest = extent_along(sides[0], way).second, lowest = extent_along(sides[1], way).first;
-  keep_near(-way, -lowest + slack, sides[0]), keep_near(way, highest + slack, sides[1]);
-  const auto distance = [&](int body, Vec3 point) { return signed_distance(bodies[body]->tightest(point), point); };
-  const auto measured = [&](bool wide_too) -> std::optional<VolumeAlone> {
-    const double off = wide_too ? wide_placing(magnitude, true) : rounded_off;
-    const double tie = wide_too ? 16 * kUnit * (sides[0].r + sides[1].r + extent) : slack;
-    for (const int i : {0, 1})
-      if (!place_features(slack, sides[1 - i].bounds, sides[i])) return std::nullopt;
-    TwoRounded both(*work, wide_too, tie, off, extent);
-    if (!both.cross_all()) return std::nullopt;
-    if (both.crossed()) {
-      if (!both.add_all([&](int body, Vec3 point) { return distance(body, point + origin); })) return std::nullopt;
-      return VolumeAlone{both.volume(), both.error()};
-    }
-    // One body holds the other one.
-    for (const int i : {0, 1}) {
-      const double whole = volume(bodies[i]->shape);
-      if (distance(1 - i, bodies[i]->support({1, 0, 0})) < -slack) return VolumeAlone{whole, kOfTermsOfTwo * whole};
-    }
-    return std::nullopt;
-  };
-  const auto enough = [](const VolumeAlone& found) {
-    return found.volume > 0 && found.error <= kEnough * found.volume;
-  };
-  // The volume is at most half the area times the distance of both planes, and in most contacts about a quarter of
-  // that. The error is at least the area times what doubles lose.
-  const bool shallow = 8 * rounded_off > kEnough * (highest - lowest);
-  std::optional<VolumeAlone> found = measured(shallow);
-  if (found && !enough(*found) && !shallow) found = measured(true);
-  return found && enough(*found) ? found : std::nullopt;
+  for (bool again = false;; again = true) {
+    // The origin has exact coordinates in the first body's core.
+    const Vec3 inner = apply_transposed(a.pose.rotation, origin - a.pose.translation);
+    for (const int i : {0, 1}) sides[i].wide_rotation = wide_rotation(bodies[i]->orientation);
+    const WideVector in_other =
+        apply_transposed(sides[1].wide_rotation, sides[0].wide_rotation * (wide(inner) + wide(data_origin(a.shape))) +
+                                                     wide_difference(a.position, b.position)) -
+        wide(data_origin(b.shape));
+    start(a, wide(inner), sides[0]), start(b, in_other, sides[1]);
+    const double magnitude = reach(a, reach(b, size)), rounded_off = rounding(magnitude), slack = 4 * rounded_off;
+    const Bounds common{max(sides[0].bounds.lower, sides[1].bounds.lower),
+                        min(sides[0].bounds.upper, sides[1].bounds.upper)};
+    const double extent = norm(common.upper - common.lower);
+    // No point of a body is beyond its own plane across this direction.
+    const Vec3 way = between ? a.tightest(origin).normal : unit(b.pose.translation - a.pose.translation);
+    const double highest = extent_along(sides[0], way).second, lowest = extent_along(sides[1], way).first;
+    keep_near(-way, -lowest + slack, sides[0]), keep_near(way, highest + slack, sides[1]);
+    const auto distance = [&](int body, Vec3 point) { return signed_distance(bodies[body]->tightest(point), point); };
+    const auto measured = [&](bool wide_too) -> std::optional<VolumeAlone> {
+      const double off = wide_too ? wide_placing(magnitude, true) : rounded_off;
+      const double tie = wide_too ? 16 * kUnit * (sides[0].r + sides[1].r + extent) : slack;
+      for (const int i : {0, 1})
+        if (!place_features(slack, sides[1 - i].bounds, i == 0 ? way : -way, highest - lowest, sides[i]))
+          return std::nullopt;
+      TwoRounded both(*work, wide_too, tie, off, extent);
+      if (!both.cross_all()) return std::nullopt;
+      if (both.crossed()) {
+        if (!both.add_all([&](int body, Vec3 point) { return distance(body, point + origin); })) return std::nullopt;
+        return VolumeAlone{both.volume(), both.error()};
+      }
+      // One body holds the other one.
+      for (const int i : {0, 1}) {
+        const double whole = volume(bodies[i]->shape);
+        if (distance(1 - i, bodies[i]->support({1, 0, 0})) < -slack) return VolumeAlone{whole, kOfTermsOfTwo * whole};
+      }
+      return std::nullopt;
+    };
+    const auto enough = [](const VolumeAlone& found) {
+      return found.volume > 0 && found.error <= kEnough * found.volume;
+    };
+    // The volume is at most half the area times the distance of both planes, and in most contacts about a quarter of
+    // that. The error is at least the area times what doubles lose.
+    const bool shallow = 8 * rounded_off > kEnough * (highest - lowest);
+    const std::optional<VolumeAlone> found = measured(again || shallow);
+    if (!found || enough(*found)) return found;
+    if (again) return std::nullopt;
+    // From the middle of the crossings, terms are smaller.
+    Vec3 sum;
+    size_t count = 0;
+    for (const Side& side : sides)
+      for (const Crossing& crossing : side.crossings) sum += crossing.point, ++count;
+    if (count > 0) origin += sum / static_cast<double>(count);
+  }
 }
 
 }  // namespace overlapper::offset
