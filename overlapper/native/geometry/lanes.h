@@ -134,6 +134,40 @@ inline bool is_wider() {
 #define OVERLAPPER_FUSING
 #endif
 
+#if defined(OVERLAPPER_VECTORS) && defined(__has_builtin)
+#if __has_builtin(__builtin_shufflevector)
+#define OVERLAPPER_SHUFFLES
+#endif
+#endif
+
+/// The lanes of two quads with these numbers: 0 to 3 are of `one`, 4 to 7 of `other`. GCC goes through memory for a
+/// quad of single lanes, and the next load of the quad then waits for all of them.
+template <int i, int j, int k, int l>
+inline void pick(const Quad& one, const Quad& other, Quad& result) {
+#ifdef OVERLAPPER_SHUFFLES
+  result = __builtin_shufflevector(one, other, i, j, k, l);
+#else
+  const auto lane = [&](int n) { return n < 4 ? one[n] : other[n - 4]; };
+  result = Quad{lane(i), lane(j), lane(k), lane(l)};
+#endif
+}
+
+/// Bit k is set if lane k of a comparison is true.
+template <class Mask>
+inline unsigned bits_of(const Mask& mask) {
+  unsigned bits = 0;
+  for (unsigned k = 0; k < sizeof(Mask) / sizeof(mask[0]); ++k) bits |= static_cast<unsigned>(mask[k] & 1) << k;
+  return bits;
+}
+#if defined(OVERLAPPER_VECTORS) && defined(__x86_64__)
+inline unsigned bits_of(const std::int64_t __attribute__((vector_size(16))) & mask) {
+  return static_cast<unsigned>(_mm_movemask_pd(reinterpret_cast<const __m128d&>(mask)));
+}
+OVERLAPPER_FUSING inline unsigned bits_of(const std::int64_t __attribute__((vector_size(32))) & mask) {
+  return static_cast<unsigned>(_mm256_movemask_pd(reinterpret_cast<const __m256d&>(mask)));
+}
+#endif
+
 #if defined(__AVX2__)
 using MostLanes = Quad;
 #else

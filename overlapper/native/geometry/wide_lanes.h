@@ -85,12 +85,15 @@ using WideColumns = std::array<WideLanes, 4>;
 
 /// The transpose of a 4 × 4 matrix, in two steps of one or two instructions each.
 inline void transpose(Quad& a, Quad& b, Quad& c, Quad& d) {
-  const Quad ab02{a[0], b[0], a[2], b[2]}, ab13{a[1], b[1], a[3], b[3]};
-  const Quad cd02{c[0], d[0], c[2], d[2]}, cd13{c[1], d[1], c[3], d[3]};
-  a = Quad{ab02[0], ab02[1], cd02[0], cd02[1]};
-  b = Quad{ab13[0], ab13[1], cd13[0], cd13[1]};
-  c = Quad{ab02[2], ab02[3], cd02[2], cd02[3]};
-  d = Quad{ab13[2], ab13[3], cd13[2], cd13[3]};
+  Quad ab02, ab13, cd02, cd13;
+  pick<0, 4, 2, 6>(a, b, ab02);
+  pick<1, 5, 3, 7>(a, b, ab13);
+  pick<0, 4, 2, 6>(c, d, cd02);
+  pick<1, 5, 3, 7>(c, d, cd13);
+  pick<0, 1, 4, 5>(ab02, cd02, a);
+  pick<0, 1, 4, 5>(ab13, cd13, b);
+  pick<2, 3, 6, 7>(ab02, cd02, c);
+  pick<2, 3, 6, 7>(ab13, cd13, d);
 }
 inline WideColumns transposed(const WideLanes& a, const WideLanes& b, const WideLanes& c, const WideLanes& d = {}) {
   WideColumns m{a, b, c, d};

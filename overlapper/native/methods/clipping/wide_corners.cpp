@@ -280,7 +280,8 @@ std::optional<double> place_in_wide(const CommonCorners& common, const Mat3& axe
   std::vector<Vec3> expected(vertices.begin(), vertices.end());
   place_by<false>(common, axes, expected, planes, approach);
 #endif
-  const std::optional<double> rounding = fastest_placing()(common, axes, vertices, planes, approach);
+  static Placing* const place_fastest = fastest_placing();
+  const std::optional<double> rounding = place_fastest(common, axes, vertices, planes, approach);
   assert(std::ranges::equal(vertices, expected, same));
   return rounding;
 }
