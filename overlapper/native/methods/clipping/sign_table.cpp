@@ -21,6 +21,10 @@ inline void read(const double* p, Lanes& v) {
 /// Calls `use(plane)` for each plane whose bit j % 64 is set, in order.
 template <class Use>
 inline void for_each_plane(std::uint64_t marked, int stride, Use use) {
+  if (stride <= 64) {
+    for (; marked != 0; marked &= marked - 1) use(std::countr_zero(marked));
+    return;
+  }
   for (int first = 0; first < stride; first += 64) {
     for (std::uint64_t rest = marked; rest != 0; rest &= rest - 1)
       if (const int j = first + std::countr_zero(rest); j < stride) use(j);
@@ -53,16 +57,14 @@ struct EdgeSigns {
   /// True if the point where the edge crosses a plane, with its error, is certainly inside all other planes.
   template <class Lanes>
   bool certain(Crossing crossing, double doubt) const {
-    decltype(Lanes{} > Lanes{}) hidden{};  // per lane: number of planes that it may be outside of
+    int hidden = 0;  // number of planes that it may be outside of
     for (int j = 0; j < stride; j += kLanes<Lanes>) {
       Lanes begin, end;
       read(from + j, begin);
       read(to + j, end);
-      hidden -= begin + crossing.at * (end - begin) >= -doubt;
+      hidden += std::popcount(bits_of(begin + crossing.at * (end - begin) >= -doubt));
     }
-    auto planes = hidden[0];
-    for (int k = 1; k < kLanes<Lanes>; ++k) planes += hidden[k];
-    return planes == 1;  // This is the crossed plane itself, by rounding.
+    return hidden == 1;  // This is the crossed plane itself, by rounding.
   }
 
   /// The same, one plane at a time: the error is along the edge, so it counts less for planes that are nearly parallel
@@ -81,10 +83,12 @@ struct EdgeSigns {
 
   /// The plane through which the edge leaves from an end that is inside.
   Crossing exit(bool from_inside) const {
+    const std::uint64_t planes = from_inside ? to_outside : from_outside;
+    if (stride <= 64 && std::has_single_bit(planes)) return at_plane(std::countr_zero(planes));
     const double *inner = from_inside ? from : to, *outer = from_inside ? to : from;
     double steepest = 0;
     int g = 0;
-    for_each_plane(from_inside ? to_outside : from_outside, stride, [&](int j) {
+    for_each_plane(planes, stride, [&](int j) {
       const double ratio = outer[j] / -inner[j];
       if (ratio > steepest) steepest = ratio, g = j;
     });
@@ -142,44 +146,40 @@ Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
   stride = by.stride;
   rows.resize(static_cast<size_t>(of.vertices) * stride);
   outside.resize(of.vertices);
+  beyond.resize(of.vertices);
   // Local copies: as far as the compiler knows, storing a sign might move the arrays.
   const double *nx = by.nx.data(), *ny = by.ny.data(), *nz = by.nz.data(), *offset = by.offset.data();
   const double *vx = of.x.data(), *vy = of.y.data(), *vz = of.z.data(), *doubt = of.doubt.data();
   double* signs = rows.data();
   const ptrdiff_t vertices = of.vertices, planes = stride;
-  decltype(Lanes{} > Lanes{}) first_bits{};
-  for (int k = 0; k < kLanes<Lanes>; ++k) first_bits[k] = 1 << k;
   bool uncertain = false;
   double most_doubt = 0;
+  std::uint64_t beyond_of_all = ~std::uint64_t{0};
   for (ptrdiff_t i = 0; i < vertices; ++i, signs += planes) {
-    const Lanes x = vx[i] - Lanes{}, y = vy[i] - Lanes{}, z = vz[i] - Lanes{};
+    const double x = vx[i], y = vy[i], z = vz[i];
     Lanes farthest = -kInfinity - Lanes{};
-    decltype(x > y) marked{};
-    for (ptrdiff_t first = 0; first < planes; first += 64) {
-      auto bit = first_bits;
-      const ptrdiff_t end = std::min(first + 64, planes);
-      for (ptrdiff_t j = first; j < end; j += kLanes<Lanes>, bit <<= kLanes<Lanes>) {
-        Lanes normal_x, normal_y, normal_z, height;
-        read(nx + j, normal_x);
-        read(ny + j, normal_y);
-        read(nz + j, normal_z);
-        read(offset + j, height);
-        const Lanes s = normal_x * x + normal_y * y + normal_z * z - height;
-        store(signs + j, s);
-        choose(farthest > s, farthest, s, farthest);
-        marked |= (s > 0.0) & bit;
-      }
+    std::uint64_t marked = 0, sure = 0;
+    for (ptrdiff_t j = 0; j < planes; j += kLanes<Lanes>) {
+      Lanes normal_x, normal_y, normal_z, height;
+      read(nx + j, normal_x);
+      read(ny + j, normal_y);
+      read(nz + j, normal_z);
+      read(offset + j, height);
+      const Lanes s = normal_x * x + normal_y * y + normal_z * z - height;
+      store(signs + j, s);
+      choose(farthest > s, farthest, s, farthest);
+      marked |= std::uint64_t{bits_of(s > 0.0)} << j % 64;
+      sure |= std::uint64_t{bits_of(s > rounding)} << j % 64;
     }
     double s = farthest[0];
-    outside[i] = static_cast<std::uint64_t>(marked[0]);
-    for (int k = 1; k < kLanes<Lanes>; ++k) {
-      s = std::max(s, farthest[k]);
-      outside[i] |= static_cast<std::uint64_t>(marked[k]);
-    }
+    for (int k = 1; k < kLanes<Lanes>; ++k) s = std::max(s, farthest[k]);
+    outside[i] = marked, beyond[i] = sure;
+    beyond_of_all &= sure;
     uncertain |= std::abs(s) <= rounding + doubt[i];
     most_doubt = std::max(most_doubt, doubt[i]);
   }
-  if (of.whole && beyond_a_plane(rounding + most_doubt)) return Signs::kSeparated;
+  plain = planes <= 64 && most_doubt == 0;
+  if (of.whole && (plain ? beyond_of_all != 0 : beyond_a_plane(rounding + most_doubt))) return Signs::kSeparated;
   return uncertain ? Signs::kUncertain : Signs::kCertain;
 }
 
@@ -230,24 +230,27 @@ class EdgeCutter {
 
  private:
   int add_vertex(Vec3 v, double doubt, const CornerSource& corner) {
+    const int number = static_cast<int>(w_.vertices.size());
     w_.vertices.push_back(v);
     w_.doubt.push_back(doubt);
     w_.corners.push_back(corner);
-    return static_cast<int>(w_.vertices.size()) - 1;
+    return number;
   }
 
   bool cut_edges(const Solid& body, const SignTable& signs, std::vector<int>& common_vertex, bool is_first) {
-    common_vertex.assign(body.vertices, -1);
+    common_vertex.resize(body.vertices);
+    int* const common_vertices = common_vertex.data();
+    const std::uint64_t *outside = signs.outside.data(), *beyond = signs.beyond.data();
+    const double* doubts = body.doubt.data();
     for (int i = 0; i < body.vertices; ++i)
-      if (signs.outside[i] == 0)
-        common_vertex[i] = add_vertex(body.vertex(i), body.doubt[i], {is_first ? 0 : 1, i, {}});
+      common_vertices[i] = outside[i] == 0 ? add_vertex(body.vertex(i), doubts[i], {is_first ? 0 : 1, i, {}}) : -1;
     const int offset = is_first ? 0 : w_.first.facets, other_offset = w_.first.facets - offset;
     const double* rows = signs.rows.data();
-    const std::uint64_t* outside = signs.outside.data();
-    const double* doubts = body.doubt.data();
     const ptrdiff_t stride = signs.stride;
+    const bool plain = signs.plain;
     for (const Edge& e : body.edges) {
-      Edge common{common_vertex[e.from], common_vertex[e.to], e.left + offset, e.right + offset};
+      if (plain && (beyond[e.from] & beyond[e.to]) != 0) continue;
+      Edge common{common_vertices[e.from], common_vertices[e.to], e.left + offset, e.right + offset};
       const bool from_inside = common.from >= 0, to_inside = common.to >= 0;
       if (!(from_inside && to_inside)) {
         const EdgeSigns edge{rows + e.from * stride, rows + e.to * stride,

@@ -16,6 +16,8 @@ struct SignTable {
   int stride = 0;
   std::vector<double> rows;            ///< by vertex
   std::vector<std::uint64_t> outside;  ///< per vertex: bit j % 64 is set if it is outside of plane j
+  std::vector<std::uint64_t> beyond;   ///< likewise, if it is outside by more than the rounding of signs
+  bool plain = false;                  ///< each bit stands for one plane, and vertices have no doubts of their own
 
   const double* row(int vertex) const { return rows.data() + static_cast<ptrdiff_t>(vertex) * stride; }
 
