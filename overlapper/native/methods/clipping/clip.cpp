@@ -4,6 +4,7 @@
 
 #include "geometry/constants.h"
 #include "geometry/rounding.h"
+#include "geometry/wide_lanes.h"
 #include "methods/clipping/flush_walls.h"
 #include "methods/clipping/sign_table.h"
 #include "shapes/canonical_order.h"
@@ -13,11 +14,16 @@
 namespace overlapper {
 namespace {
 
+struct Row {
+  Quad lanes;
+};
+
 struct Workspace : TableClipping {
-  std::vector<int> apex;          ///< per facet: one of its vertices, or -1
-  std::vector<double> cone;       ///< per facet: six times the volume of the cone from the origin
-  std::vector<double> extent;     ///< per vertex: the sum of its coordinates over their size
-  std::vector<Vec3> area_vector;  ///< per facet: twice its area vector
+  std::vector<int> apex;         ///< per facet: one of its vertices, or -1
+  std::vector<double> cone;      ///< per facet: six times the volume of the cone from the origin
+  std::vector<double> distance;  ///< per facet in the common polytope: of its plane from the middle
+  std::vector<Row> row;          ///< per vertex: its coordinates, and the sum of their sizes over those of the whole
+  std::vector<Row> area_vector;  ///< per facet: twice its area vector
   std::vector<WideLanes> wide_planes;
   std::vector<Vec3> by_doubles;  ///< the vertices before they are placed in wider arithmetic
   std::vector<MovedWall> moved;  ///< walls that do not bound the common polytope, as another wall is flush with them
@@ -42,7 +48,6 @@ struct TwoVectors {
   TwoLanes x, y, z;
 };
 inline TwoVectors beside(Vec3 a, Vec3 b) { return {TwoLanes{a.x, b.x}, TwoLanes{a.y, b.y}, TwoLanes{a.z, b.z}}; }
-inline TwoVectors operator+(const TwoVectors& a, const TwoVectors& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline TwoVectors operator-(const TwoVectors& a, const TwoVectors& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline TwoVectors operator/(const TwoVectors& a, double s) { return {a.x / s, a.y / s, a.z / s}; }
 inline TwoVectors operator*(TwoLanes s, const TwoVectors& a) { return {s * a.x, s * a.y, s * a.z}; }
@@ -53,6 +58,15 @@ inline TwoVectors cross(const TwoVectors& a, const TwoVectors& b) {
 inline TwoLanes norm2(const TwoVectors& a) { return dot(a, a); }
 inline Vec3 lane(const TwoVectors& a, int k) { return {a.x[k], a.y[k], a.z[k]}; }
 
+/// Four vertices, with their coordinates side by side.
+struct FourRows {
+  FourRows(const Row& a, const Row& b, const Row& c, const Row& d)
+      : x(a.lanes), y(b.lanes), z(c.lanes), extent(d.lanes) {
+    transpose(x, y, z, extent);
+  }
+  Quad x, y, z, extent;
+};
+
 /// Calls `use(e, f, two)` for edges two at a time. For an odd number the last call has one edge: `f` equals `e`.
 template <class Use>
 void for_each_two(std::span<const Edge> edges, Use use) {
@@ -62,23 +76,86 @@ void for_each_two(std::span<const Edge> edges, Use use) {
   }
 }
 
+/// The sums over tetrahedra from the origin over each edge and a corner of either facet; none is negative.
+struct ConeSums {
+  Quad moment_and_volume{};  ///< 24 times the first moment, and six times the volume
+  double uncancelled = 0;    ///< upper bound of six times the volumes, without cancellation of terms
+
+  /// Adds tetrahedra. The terms of four edges are computed together and added in order.
+  void add(std::span<const Edge> edges, const Row* row, const int* apex, double* cone) {
+    for (size_t i = 0; i < edges.size(); i += 4) {
+      const size_t rest = edges.size() - i;
+      const Edge &e = edges[i], &f = edges[rest > 1 ? i + 1 : i], &g = edges[rest > 2 ? i + 2 : i],
+                 &h = edges[rest > 3 ? i + 3 : i];
+      const FourRows from(row[e.from], row[f.from], row[g.from], row[h.from]),
+          to(row[e.to], row[f.to], row[g.to], row[h.to]),
+          left(row[apex[e.left]], row[apex[f.left]], row[apex[g.left]], row[apex[h.left]]),
+          right(row[apex[e.right]], row[apex[f.right]], row[apex[g.right]], row[apex[h.right]]);
+      const Quad sum_x = from.x + to.x, sum_y = from.y + to.y, sum_z = from.z + to.z;
+      const Quad area_x = from.y * to.z - from.z * to.y, area_y = from.z * to.x - from.x * to.z,
+                 area_z = from.x * to.y - from.y * to.x;
+      const Quad on_left = left.x * area_x + left.y * area_y + left.z * area_z,
+                 on_right = -(right.x * area_x + right.y * area_y + right.z * area_z),
+                 products = (left.extent + right.extent) * from.extent * to.extent;
+      Quad x = on_left * (left.x + sum_x) + on_right * (right.x + sum_x),
+           y = on_left * (left.y + sum_y) + on_right * (right.y + sum_y),
+           z = on_left * (left.z + sum_z) + on_right * (right.z + sum_z), on_both = on_left + on_right;
+      transpose(x, y, z, on_both);
+      const auto add_lane = [&](const Edge& edge, int k, const Quad& terms) {
+        cone[edge.left] += on_left[k];
+        cone[edge.right] += on_right[k];
+        uncancelled += products[k];
+        moment_and_volume += terms;
+      };
+      add_lane(e, 0, x);
+      if (rest > 1) add_lane(f, 1, y);
+      if (rest > 2) add_lane(g, 2, z);
+      if (rest > 3) add_lane(h, 3, on_both);
+    }
+  }
+};
+
+/// Finds the cones of facets, and their sums. Sizes of vertices count in units of 1 / per_size.
+void add_cones(Workspace& w, Vec3 per_size, ConeSums& sums) {
+  const size_t vertices = w.vertices.size();
+  w.row.resize(vertices);
+  Row* const row = w.row.data();
+  for (size_t i = 0; i < vertices; ++i) {
+    const Vec3 v = w.vertices[i];
+    row[i].lanes = Quad{v.x, v.y, v.z, dot(abs(v), per_size)};
+  }
+  const size_t facets = w.first.facets + w.second.facets;
+  w.apex.assign(facets, -1);
+  w.cone.assign(facets, 0);
+  int* const apex = w.apex.data();
+  for (const auto* list : {&w.edges, &w.seam})
+    for (const Edge& e : *list) apex[e.left] = apex[e.right] = e.from;
+  ConeSums found;
+  for (const auto* list : {&w.edges, &w.seam}) found.add(*list, row, apex, w.cone.data());
+  sums = found;
+}
+
+#ifdef OVERLAPPER_WIDER
+OVERLAPPER_WIDER void add_cones_wider(Workspace& w, Vec3 per_size, ConeSums& sums) { add_cones(w, per_size, sums); }
+auto* const add_cones_fastest = is_wider() ? add_cones_wider : add_cones;
+#else
+auto* const add_cones_fastest = add_cones;
+#endif
+
 /// Sums over the common polytope from clipping. Its vertices are relative to a point inside.
 class Sums {
  public:
   /// `size` is the extent of the vertices along each axis, or any other unit of length.
   Sums(Workspace& workspace, Vec3 size) : w_(workspace) {
     const Vec3 per_size{1 / size.x, 1 / size.y, 1 / size.z};
-    w_.apex.assign(w_.first.facets + w_.second.facets, -1);
-    w_.cone.assign(w_.first.facets + w_.second.facets, 0);
-    w_.extent.resize(w_.vertices.size());
-    std::ranges::transform(w_.vertices, w_.extent.begin(), [&](Vec3 v) { return dot(abs(v), per_size); });
-    for (const auto* list : {&w_.edges, &w_.seam})
-      for (const Edge& e : *list) w_.apex[e.left] = w_.apex[e.right] = e.from;
-    for (const auto* list : {&w_.edges, &w_.seam}) add(*list);
+    ConeSums sums;
+    add_cones_fastest(w_, per_size, sums);
+    const Quad& found = sums.moment_and_volume;
+    moment_ = {found[0], found[1], found[2]}, six_volumes_ = found[3];
     // Each product of three coordinates is rounded less than eight times. Then follows the sum of the tetrahedra; no
     // tetrahedron is negative.
     const double terms = 2 * static_cast<double>(w_.edges.size() + w_.seam.size());
-    rounding_ = 8 * 0x1p-53 * uncancelled_ * size.x * size.y * size.z / 6 + terms * 0x1p-53 * six_volumes_ / 6;
+    rounding_ = 8 * 0x1p-53 * sums.uncancelled * size.x * size.y * size.z / 6 + terms * 0x1p-53 * six_volumes_ / 6;
   }
 
   double volume() const { return six_volumes_ / 6; }
@@ -103,42 +180,9 @@ class Sums {
   }
 
  private:
-  /// Tetrahedra from the origin over each edge and a corner of either facet; none is negative. The terms of two edges
-  /// are computed together and added in order.
-  void add(std::span<const Edge> edges) {
-    const Vec3* vertices = w_.vertices.data();
-    const double* extent = w_.extent.data();
-    const int* apex = w_.apex.data();
-    double* cone = w_.cone.data();
-    Vec3 moment = moment_;
-    double six_volumes = six_volumes_, uncancelled = uncancelled_;
-    for_each_two(edges, [&](const Edge& e, const Edge& f, bool two) {
-      const int left_e = apex[e.left], left_f = apex[f.left], right_e = apex[e.right], right_f = apex[f.right];
-      const TwoVectors from = beside(vertices[e.from], vertices[f.from]), to = beside(vertices[e.to], vertices[f.to]);
-      const TwoVectors left = beside(vertices[left_e], vertices[left_f]), sum = from + to, area = cross(from, to);
-      const TwoVectors right = beside(vertices[right_e], vertices[right_f]);
-      const TwoLanes on_left = dot(left, area), on_right = -dot(right, area), on_both = on_left + on_right;
-      const TwoLanes products =
-          (TwoLanes{extent[left_e], extent[left_f]} + TwoLanes{extent[right_e], extent[right_f]}) *
-          TwoLanes{extent[e.from], extent[f.from]} * TwoLanes{extent[e.to], extent[f.to]};
-      const TwoVectors moments = on_left * (left + sum) + on_right * (right + sum);
-      const auto add_lane = [&](const Edge& edge, int k) {
-        cone[edge.left] += on_left[k];
-        cone[edge.right] += on_right[k];
-        uncancelled += products[k];
-        six_volumes += on_both[k];
-        moment += lane(moments, k);
-      };
-      add_lane(e, 0);
-      if (two) add_lane(f, 1);
-    });
-    moment_ = moment, six_volumes_ = six_volumes, uncancelled_ = uncancelled;
-  }
-
   Workspace& w_;
   Vec3 moment_;
   double six_volumes_ = 0;
-  double uncancelled_ = 0;  ///< upper bound of six times the volumes, without cancellation of terms
   double rounding_ = 0;
 };
 
@@ -159,21 +203,14 @@ struct WantedPatch {
   }
 };
 
-/// The distance of a common facet's plane from the middle of the common polytope.
-struct Slack {
-  Vec3 normal;
-  double distance;
-};
-
-/// Calls `use(facet, slack)` for each facet of the common polytope.
+/// Calls `use(facet, body, plane)` for each facet of the common polytope.
 template <class Use>
-void for_each_facet(const Workspace& w, Vec3 middle, Use use) {
-  for (int f = 0; f < static_cast<int>(w.apex.size()); ++f) {
-    if (w.apex[f] < 0) continue;
-    const Solid& body = f < w.first.facets ? w.first : w.second;
-    const int plane = f < w.first.facets ? f : f - w.first.facets;
-    use(f, Slack{body.normal(plane), body.offset[plane] - dot(body.normal(plane), middle)});
-  }
+void for_each_facet(const Workspace& w, Use use) {
+  const int* apex = w.apex.data();
+  int f = 0;
+  for (const Solid* body : {&w.first, &w.second})
+    for (int plane = 0; plane < body->facets; ++plane, ++f)
+      if (apex[f] >= 0) use(f, *body, plane);
 }
 
 /// The volume between the polytope and a polytope whose planes are moved out by `moved`, with the growth of the area on
@@ -184,33 +221,59 @@ double moved_volume(double area, double moved, double least_slack) {
 
 /// Orthogonal axes as rows. The first axis is across the facet nearest to the middle, the second across the next
 /// nearest facet. Along each axis, the coordinates of a sliver or a needle are then no larger than its thickness.
-Mat3 thin_axes(const Workspace& w, Vec3 middle) {
-  Slack nearest{{}, kInfinity}, next{{}, kInfinity};
-  for_each_facet(w, middle, [&](int, const Slack& s) { nearest = s.distance < nearest.distance ? s : nearest; });
-  const Vec3 first = unit(nearest.normal);
-  for_each_facet(w, middle, [&](int, const Slack& s) {
-    const Vec3 along = s.normal - dot(s.normal, first) * first;
+Mat3 thin_axes(const Workspace& w) {
+  const double* distances = w.distance.data();
+  Vec3 nearest_normal, next;
+  double nearest = kInfinity, next_distance = kInfinity;
+  for_each_facet(w, [&](int f, const Solid& body, int plane) {
+    if (distances[f] < nearest) nearest = distances[f], nearest_normal = body.normal(plane);
+  });
+  const Vec3 first = unit(nearest_normal);
+  for_each_facet(w, [&](int f, const Solid& body, int plane) {
+    const Vec3 normal = body.normal(plane), along = normal - dot(normal, first) * first;
     const double length2 = norm2(along);
     if (length2 < 0x1p-10) return;  // the new direction is more than rounding
-    const double distance = s.distance / std::sqrt(length2);
-    if (distance < next.distance) next = {along, distance};
+    const double distance = distances[f] / std::sqrt(length2);
+    if (distance < next_distance) next_distance = distance, next = along;
   });
-  const Vec3 along = unit(next.normal), second = unit(along - dot(along, first) * first);
+  const Vec3 along = unit(next), second = unit(along - dot(along, first) * first);
   return {first, second, cross(first, second)};
+}
+
+/// Twice the area vectors of facets, from their corners alone.
+void find_area_vectors(Workspace& w) {
+  w.area_vector.assign(w.apex.size(), Row{});
+  Row* const sums = w.area_vector.data();
+  const auto add = [&](const Edge& e, const Quad& area) {
+    sums[e.left].lanes += area;
+    sums[e.right].lanes -= area;
+  };
+  const Vec3* vertices = w.vertices.data();
+  for (const auto* list : {&w.edges, &w.seam}) {
+    for (const Edge& e : *list) {
+      const Vec3 area = cross(vertices[e.from], vertices[e.to] - vertices[e.from]);
+      add(e, Quad{area.x, area.y, area.z, 0});
+    }
+  }
+}
+
+#ifdef OVERLAPPER_WIDER
+OVERLAPPER_WIDER void find_area_vectors_wider(Workspace& w) { find_area_vectors(w); }
+auto* const find_area_vectors_fastest = is_wider() ? find_area_vectors_wider : find_area_vectors;
+#else
+auto* const find_area_vectors_fastest = find_area_vectors;
+#endif
+
+Vec3 area_vector(const Workspace& w, int facet) {
+  const Quad& area = w.area_vector[facet].lanes;
+  return {area[0], area[1], area[2]};
 }
 
 /// The areas of facets, from their corners alone.
 double area_by_corners(Workspace& w) {
-  w.area_vector.assign(w.apex.size(), {});
-  for (const auto* list : {&w.edges, &w.seam}) {
-    for (const Edge& e : *list) {
-      const Vec3 area = cross(w.vertices[e.from], w.vertices[e.to] - w.vertices[e.from]);
-      w.area_vector[e.left] += area;
-      w.area_vector[e.right] -= area;
-    }
-  }
+  find_area_vectors_fastest(w);
   double area = 0;
-  for (Vec3 twice : w.area_vector) area += std::sqrt(norm2(twice)) / 2;
+  for (int f = 0; f < static_cast<int>(w.apex.size()); ++f) area += std::sqrt(norm2(area_vector(w, f))) / 2;
   return area;
 }
 
@@ -222,7 +285,8 @@ double cut_off(Workspace& w) {
   double volume = 0;
   for (const MovedWall& wall : w.moved) {
     double projection = 0;  // each point of it is covered by two facets, and area vectors are twice as long
-    for (Vec3 area : w.area_vector) projection += std::abs(dot(area, wall.normal)) / 4;
+    for (int f = 0; f < static_cast<int>(w.apex.size()); ++f)
+      projection += std::abs(dot(area_vector(w, f), wall.normal)) / 4;
     volume += 2 * wall.beyond * projection;
   }
   return volume;
@@ -232,7 +296,7 @@ double cut_off(Workspace& w) {
 /// unchanged if even that is not accurate enough.
 void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reach, double least_slack, double cut,
                      Vec3 middle, Measures& measures, Pull& on_first, WantedPatch* wanted) {
-  const Mat3 axes = thin_axes(w, middle);
+  const Mat3 axes = thin_axes(w);
   w.by_doubles.assign(w.vertices.begin(), w.vertices.end());
   std::optional<Sums> sums;
   double area = 0, error = kInfinity;
@@ -273,12 +337,19 @@ bool measure(Workspace& w, const Sums& sums, Vec3 middle, double rounding, doubl
   common.way = Way::kClipping;
   common.volume = sums.volume();
   common.centroid = middle + sums.centroid();
-  double nearest = kInfinity;
-  for_each_facet(w, middle, [&](int f, const Slack& slack) {
-    common.area += w.cone[f] / (2 * slack.distance);
-    nearest = std::min(nearest, slack.distance);
-    ++common.facets_touched;
+  w.distance.resize(w.apex.size());
+  double* const distances = w.distance.data();
+  const double* cones = w.cone.data();
+  double nearest = kInfinity, area = 0;
+  int facets = 0;
+  for_each_facet(w, [&](int f, const Solid& body, int plane) {
+    const double distance = body.offset[plane] - dot(body.normal(plane), middle);
+    distances[f] = distance;
+    area += cones[f] / (2 * distance);
+    nearest = std::min(nearest, distance);
+    ++facets;
   });
+  common.area = area, common.facets_touched = facets;
   if (!(nearest > least_slack)) return false;
   least_slack = nearest;
   common.volume_error = moved_volume(common.area, rounding, least_slack) + sums.volume_rounding() + cut;
@@ -330,7 +401,7 @@ SideAreas side_areas(Workspace& w, const Placed& first, const Placed& second) {
     const Shape& shape = of_first ? first.shape : second.shape;
     if (polytope_of(shape)) continue;
     const int side = of_first ? f : f - w.first.facets;
-    const double area = std::sqrt(norm2(w.area_vector[f])) / 2;
+    const double area = std::sqrt(norm2(area_vector(w, f))) / 2;
     Vec3& sum = areas[of_first ? 0 : 1];
     (side < 2 ? sum.x : side < 4 ? sum.y : sum.z) += area;
   }
