@@ -58,7 +58,7 @@ void of_wide_lanes(const double* numbers, Written& out) {
   const WideLanes wide = two_sum(a, b), other(b, 0x1p-60 * a);
   out.add(two_product<fused>(a, b)), out.add(two_product<fused>(a, c));
   out.add(wide), out.add(wide - other), out.add(product<fused>(wide, DoubleDouble{c, 0x1p-55 * c}));
-  const WideColumns columns = transposed(wide, other, -wide, other);
+  const WideColumns columns = transposed<fused>(wide, other, -wide, other);
   for (const WideLanes& each : columns) out.add(each);
   WideSum<fused> sum(columns, Vec3{c, 3, -c});
   sum.add(wide), sum.add_product(other, wide.head);

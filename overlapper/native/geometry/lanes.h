@@ -134,22 +134,24 @@ inline bool is_wider() {
 #define OVERLAPPER_FUSING
 #endif
 
-#if defined(OVERLAPPER_VECTORS) && defined(__has_builtin)
+#if defined(OVERLAPPER_VECTORS) && defined(__x86_64__) && defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector)
 #define OVERLAPPER_SHUFFLES
 #endif
 #endif
 
-/// The lanes of two quads with these numbers: 0 to 3 are of `one`, 4 to 7 of `other`. GCC goes through memory for a
-/// quad of single lanes, and the next load of the quad then waits for all of them.
-template <int i, int j, int k, int l>
+/// The lanes of two quads with these numbers: 0 to 3 are of `one`, 4 to 7 of `other`. `wider` in functions for AVX2:
+/// there GCC goes through memory for a quad of single lanes, and elsewhere for a shuffle of whole quads.
+template <bool wider, int i, int j, int k, int l>
 inline void pick(const Quad& one, const Quad& other, Quad& result) {
 #ifdef OVERLAPPER_SHUFFLES
-  result = __builtin_shufflevector(one, other, i, j, k, l);
-#else
-  const auto lane = [&](int n) { return n < 4 ? one[n] : other[n - 4]; };
-  result = Quad{lane(i), lane(j), lane(k), lane(l)};
+  if constexpr (wider) {
+    result = __builtin_shufflevector(one, other, i, j, k, l);
+    return;
+  }
 #endif
+  result = Quad{(i < 4 ? one : other)[i % 4], (j < 4 ? one : other)[j % 4], (k < 4 ? one : other)[k % 4],
+                (l < 4 ? one : other)[l % 4]};
 }
 
 /// Bit k is set if lane k of a comparison is true.

@@ -84,21 +84,23 @@ inline WideLanes in_lanes(const WideVector& v, DoubleDouble last = {}) {
 using WideColumns = std::array<WideLanes, 4>;
 
 /// The transpose of a 4 × 4 matrix, in two steps of one or two instructions each.
+template <bool wider>
 inline void transpose(Quad& a, Quad& b, Quad& c, Quad& d) {
   Quad ab02, ab13, cd02, cd13;
-  pick<0, 4, 2, 6>(a, b, ab02);
-  pick<1, 5, 3, 7>(a, b, ab13);
-  pick<0, 4, 2, 6>(c, d, cd02);
-  pick<1, 5, 3, 7>(c, d, cd13);
-  pick<0, 1, 4, 5>(ab02, cd02, a);
-  pick<0, 1, 4, 5>(ab13, cd13, b);
-  pick<2, 3, 6, 7>(ab02, cd02, c);
-  pick<2, 3, 6, 7>(ab13, cd13, d);
+  pick<wider, 0, 4, 2, 6>(a, b, ab02);
+  pick<wider, 1, 5, 3, 7>(a, b, ab13);
+  pick<wider, 0, 4, 2, 6>(c, d, cd02);
+  pick<wider, 1, 5, 3, 7>(c, d, cd13);
+  pick<wider, 0, 1, 4, 5>(ab02, cd02, a);
+  pick<wider, 0, 1, 4, 5>(ab13, cd13, b);
+  pick<wider, 2, 3, 6, 7>(ab02, cd02, c);
+  pick<wider, 2, 3, 6, 7>(ab13, cd13, d);
 }
+template <bool wider>
 inline WideColumns transposed(const WideLanes& a, const WideLanes& b, const WideLanes& c, const WideLanes& d = {}) {
   WideColumns m{a, b, c, d};
-  transpose(m[0].head, m[1].head, m[2].head, m[3].head);
-  transpose(m[0].tail, m[1].tail, m[2].tail, m[3].tail);
+  transpose<wider>(m[0].head, m[1].head, m[2].head, m[3].head);
+  transpose<wider>(m[0].tail, m[1].tail, m[2].tail, m[3].tail);
   return m;
 }
 

@@ -59,10 +59,11 @@ inline TwoLanes norm2(const TwoVectors& a) { return dot(a, a); }
 inline Vec3 lane(const TwoVectors& a, int k) { return {a.x[k], a.y[k], a.z[k]}; }
 
 /// Four vertices, with their coordinates side by side.
+template <bool wider>
 struct FourRows {
   FourRows(const Row& a, const Row& b, const Row& c, const Row& d)
       : x(a.lanes), y(b.lanes), z(c.lanes), extent(d.lanes) {
-    transpose(x, y, z, extent);
+    transpose<wider>(x, y, z, extent);
   }
   Quad x, y, z, extent;
 };
@@ -82,12 +83,13 @@ struct ConeSums {
   double uncancelled = 0;    ///< upper bound of six times the volumes, without cancellation of terms
 
   /// Adds tetrahedra. The terms of four edges are computed together and added in order.
+  template <bool wider>
   void add(std::span<const Edge> edges, const Row* row, const int* apex, double* cone) {
     for (size_t i = 0; i < edges.size(); i += 4) {
       const size_t rest = edges.size() - i;
       const Edge &e = edges[i], &f = edges[rest > 1 ? i + 1 : i], &g = edges[rest > 2 ? i + 2 : i],
                  &h = edges[rest > 3 ? i + 3 : i];
-      const FourRows from(row[e.from], row[f.from], row[g.from], row[h.from]),
+      const FourRows<wider> from(row[e.from], row[f.from], row[g.from], row[h.from]),
           to(row[e.to], row[f.to], row[g.to], row[h.to]),
           left(row[apex[e.left]], row[apex[f.left]], row[apex[g.left]], row[apex[h.left]]),
           right(row[apex[e.right]], row[apex[f.right]], row[apex[g.right]], row[apex[h.right]]);
@@ -100,7 +102,7 @@ struct ConeSums {
       Quad x = on_left * (left.x + sum_x) + on_right * (right.x + sum_x),
            y = on_left * (left.y + sum_y) + on_right * (right.y + sum_y),
            z = on_left * (left.z + sum_z) + on_right * (right.z + sum_z), on_both = on_left + on_right;
-      transpose(x, y, z, on_both);
+      transpose<wider>(x, y, z, on_both);
       const auto add_lane = [&](const Edge& edge, int k, const Quad& terms) {
         cone[edge.left] += on_left[k];
         cone[edge.right] += on_right[k];
@@ -116,6 +118,7 @@ struct ConeSums {
 };
 
 /// Finds the cones of facets, and their sums. Sizes of vertices count in units of 1 / per_size.
+template <bool wider>
 void add_cones(Workspace& w, Vec3 per_size, ConeSums& sums) {
   const size_t vertices = w.vertices.size();
   w.row.resize(vertices);
@@ -131,15 +134,17 @@ void add_cones(Workspace& w, Vec3 per_size, ConeSums& sums) {
   for (const auto* list : {&w.edges, &w.seam})
     for (const Edge& e : *list) apex[e.left] = apex[e.right] = e.from;
   ConeSums found;
-  for (const auto* list : {&w.edges, &w.seam}) found.add(*list, row, apex, w.cone.data());
+  for (const auto* list : {&w.edges, &w.seam}) found.add<wider>(*list, row, apex, w.cone.data());
   sums = found;
 }
 
 #ifdef OVERLAPPER_WIDER
-OVERLAPPER_WIDER void add_cones_wider(Workspace& w, Vec3 per_size, ConeSums& sums) { add_cones(w, per_size, sums); }
-auto* const add_cones_fastest = is_wider() ? add_cones_wider : add_cones;
+OVERLAPPER_WIDER void add_cones_wider(Workspace& w, Vec3 per_size, ConeSums& sums) {
+  add_cones<true>(w, per_size, sums);
+}
+auto* const add_cones_fastest = is_wider() ? add_cones_wider : add_cones<kFused>;
 #else
-auto* const add_cones_fastest = add_cones;
+auto* const add_cones_fastest = add_cones<kFused>;
 #endif
 
 /// Sums over the common polytope from clipping. Its vertices are relative to a point inside.

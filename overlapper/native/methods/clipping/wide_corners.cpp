@@ -58,7 +58,7 @@ class WideCorners {
     if (!unturned(a.orientation)) {
       // The rows of a rotation are the columns of its inverse.
       const WideColumns of_a = rotation_columns<fused>(a.orientation);
-      const WideColumns back = transposed(of_a[0], of_a[1], of_a[2]);
+      const WideColumns back = transposed<fused>(of_a[0], of_a[1], of_a[2]);
       for (int i = 0; i < 3; ++i) columns_[i] = turned(back, columns_[i]);
       translation_ = turned(back, translation_);
     }
@@ -72,7 +72,7 @@ class WideCorners {
     const Box *box_a = std::get_if<Box>(&common_.a.shape), *box_b = std::get_if<Box>(&common_.b.shape);
     if (box_a) add_sides(*box_a, kIdentity, in_lanes(-common_.origin), planes_.first(6));
     if (box_b) {
-      const WideColumns rows = transposed(columns_[0], columns_[1], columns_[2]);
+      const WideColumns rows = transposed<fused>(columns_[0], columns_[1], columns_[2]);
       add_sides(*box_b, rows, heights(rows, translation_), planes_.subspan(first_facets, 6));
     }
     for (int f = box_a ? first_facets : 0; f < (box_b ? first_facets : facets); ++f)
@@ -105,8 +105,8 @@ class WideCorners {
   void add_sides(const Box& box, const WideColumns& axes, const WideLanes& middle, std::span<WideLanes> planes) {
     const Vec3 half = box.half_extents;
     const WideLanes extents{Quad{half.x, half.y, half.z}, Quad{}};
-    const WideColumns inner = transposed(-axes[0], -axes[1], -axes[2], middle - extents);
-    const WideColumns outer = transposed(axes[0], axes[1], axes[2], -(extents + middle));
+    const WideColumns inner = transposed<fused>(-axes[0], -axes[1], -axes[2], middle - extents);
+    const WideColumns outer = transposed<fused>(axes[0], axes[1], axes[2], -(extents + middle));
     for (int k = 0; k < 3; ++k) planes[2 * k] = inner[k], planes[2 * k + 1] = outer[k];
   }
 
@@ -153,7 +153,7 @@ class WideCorners {
   /// Four planes, those number n of each corner, with a coordinate of their normals in each column.
   WideColumns planes(const std::array<size_t, 4>& at, int n) const {
     const auto plane = [&](size_t i) -> const WideLanes& { return planes_[common_.corners[i].facets[n]]; };
-    return transposed(plane(at[0]), plane(at[1]), plane(at[2]), plane(at[3]));
+    return transposed<fused>(plane(at[0]), plane(at[1]), plane(at[2]), plane(at[3]));
   }
 
   /// The steps from vertices placed by doubles to the point where three planes meet; meaningless for other corners.
