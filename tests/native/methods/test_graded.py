@@ -56,6 +56,7 @@ MENDED = {
     "an edge between nearly parallel faces": ("hull, cylinder", 10130),
     "an end of a cylinder that rushes across slices": ("cylinder, rounded hull", 52012),
     "parallel cylinders as thin as rounding": ("cylinder, cylinder", 70057),
+    "a corner of three surfaces that rushes across slices": ("cylinder, cylinder", 904887),
     "parallel cylinders with round ends as thin as rounding": ("capsule, cylinder", 70325),
     "rounding of two ellipsoids of other sizes": ("ellipsoid, ellipsoid", 70238),
     "tilts of surfaces that leave a sliver": ("cylinder, ellipsoid", 100004),

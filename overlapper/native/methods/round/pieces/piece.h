@@ -31,6 +31,7 @@ struct SlicedPiece {
   const EnclosingPolytope* around = nullptr;  ///< polytope around the piece, relative to the inner point, if known
   Vec3 offset{};                              ///< of the own point from the inner point
   bool near = false;                          ///< the own point is near the piece
+  std::optional<Vec3> long_axis{};            ///< where the piece is longest, of any length, if known
 
   /// The same piece, relative to a point that is `step` away.
   SlicedPiece moved(Vec3 step) const;

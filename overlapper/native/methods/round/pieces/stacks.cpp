@@ -62,7 +62,7 @@ slicing::View view_of(const Stack& stack, const PatchView& seen, Vec3 offset) {
 /// The stack for direction number `way` of the slices. No value if there are fewer directions.
 std::optional<Stack> stack_of(const PieceContext& at, int way) {
   const SlicedPiece& piece = at.piece;
-  std::optional<Stack> stack = slicing::stack_of(piece.rounds, piece.walls, piece.extent, way);
+  std::optional<Stack> stack = slicing::stack_of(piece.rounds, piece.walls, piece.extent, way, piece.long_axis);
   if (!stack) return std::nullopt;
   stack->stretch = at.setting.stretch, stack->areas = at.setting.areas, stack->cuts = at.setting.cuts;
   if (piece.around) {
@@ -103,9 +103,20 @@ std::optional<Vec3> nearer_point(const Stack& stack, const SlicedPiece& piece, c
   return offset;
 }
 
-bool add_near(const SlicedPiece& piece, Vec3 step, const PieceSetting& setting, Sums& sums) {
+/// The line through the centroids of the slices, by least squares. Along it, a long piece stays near the origin of
+/// every slice.
+Vec3 long_axis(const Stack& stack, const Integrals& s) {
+  const Vec3 mean = s.first / s.volume;
+  const double square = s.squares.z / s.volume - mean.z * mean.z;
+  if (!(square > 0)) return stack.t;
+  return in_world(stack, {(s.products.y / s.volume - mean.z * mean.x) / square,
+                          (s.products.x / s.volume - mean.y * mean.z) / square, 1});
+}
+
+bool add_near(const SlicedPiece& piece, Vec3 step, const std::optional<Vec3>& along, const PieceSetting& setting,
+              Sums& sums) {
   SlicedPiece nearer = piece.moved(step);
-  nearer.near = true;
+  nearer.near = true, nearer.long_axis = along;
   return add_slices(nearer, setting, sums);
 }
 
@@ -123,18 +134,27 @@ double error_of(const slicing::Sum& sum) {
 
 /// Adds a piece by slices about its centroid, if less is missing or uncertain then. The inner point may be at one end
 /// of a long piece, near a surface that is far from the rest. Slices then suit that end, and the rest has fewer digits.
+/// Or a piece moves so fast across the slices that most digits of a place only tell where its slice is.
 bool add_about_centroid(const PieceContext& at, const Stack& stack, const BestSum& sum, Sums& sums) {
   const Integrals& s = sum.best.integrals;
-  const double off = sum.open + error_of(sum.best);
-  if (at.closed(sum) && off <= kMostOpen * (at.share_of(sums.totals.volume) + s.volume)) return false;
+  const double most = kMostOpen * (at.share_of(sums.totals.volume) + s.volume);
+  double off = sum.open + error_of(sum.best);
+  if (at.closed(sum) && off <= most) return false;
   const Vec3 offset = in_world(stack, s.first / s.volume);
   if (at.piece.near || !(norm(offset) <= at.piece.extent)) return false;
-  Sums with = sums;
-  if (!add_near(at.piece, offset, at.setting, with)) return false;
-  const Totals &before = sums.totals, &after = with.totals;
-  if (!(after.volume > before.volume && after.open + after.error - before.open - before.error < off)) return false;
-  sums = with;
-  return true;
+  const Sums before = sums;
+  bool added = false;
+  for (const std::optional<Vec3>& along : {std::optional<Vec3>{}, std::optional(long_axis(stack, s))}) {
+    // Missing volume counts twice.
+    if (along && (!at.setting.closely || off <= most / 2)) break;
+    Sums with = before;
+    if (!add_near(at.piece, offset, along, at.setting, with)) continue;
+    const Totals &less = before.totals, &more = with.totals;
+    const double left = more.open + more.error - less.open - less.error;
+    if (!(more.volume > less.volume && left < off)) continue;
+    sums = with, off = left, added = true;
+  }
+  return added;
 }
 
 void add_sum(const Stack& stack, const slicing::Sum& sum, Vec3 offset, const quadric::Stretch* stretch, Sums& sums) {
@@ -212,7 +232,7 @@ bool add_slices(const SlicedPiece& piece, const PieceSetting& setting, Sums& sum
     keep_better(*stack, at, !setting.stretch, 0, sum);
     if (!at.closed(sum, 0.1))
       if (const auto step = nearer_point(*stack, piece, sum.best.integrals))
-        if (add_near(piece, *step, setting, sums)) return true;
+        if (add_near(piece, *step, {}, setting, sums)) return true;
     refine(*stack, at, sum);
     if (add_about_centroid(at, *stack, sum, sums)) return true;
   }

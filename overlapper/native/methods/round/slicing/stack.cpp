@@ -125,8 +125,10 @@ Axes along_strips(const Axes& axes, const WideVector& normal) {
   return sheared(cross(m, axes.n), m, axes.n, axes.t);
 }
 
-/// Chooses slices parallel to the way out, and to the axis of a cylinder.
-Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double tangent_of_angle) {
+/// Chooses slices parallel to the way out, and to the axis of a cylinder. The slices of two cylinders follow the long
+/// axis of the part, if that is known.
+Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double tangent_of_angle,
+            const std::optional<Vec3>& long_axis) {
   const Round *one = nullptr, *two = nullptr;
   for (const Round& r : rounds)
     if (!r.ball) (one ? two : one) = &r;
@@ -142,7 +144,8 @@ Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double t
       const WideVector m = unit(flat), l = cross(m, n);
       WideVector along = n;
       // If the shortest way out is nearly across the slices, the slices are as wide as the common set.
-      if (steep(near.ridge, n)) along = near.ridge;
+      if (long_axis) along = wide(*long_axis);
+      else if (steep(near.ridge, n)) along = near.ridge;
       else if (width > 8 * std::sqrt(std::max(0.0, 2 * near.way.slack / radius))) along = across(n, out);
       return sheared(l, m, n, along);
     }
@@ -192,12 +195,13 @@ bool two_cylinders(std::span<const Round> rounds) { return rounds.size() > 1 && 
 
 /// The axes number `way` among the suitable turns. If no turn is suitable, number 0 is the first turn. The slices of
 /// two cylinders whose axes are not parallel cannot be turned.
-std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way) {
-  const Axes first = choose(rounds, walls, 0);
+std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way,
+                            const std::optional<Vec3>& long_axis) {
+  const Axes first = choose(rounds, walls, 0, long_axis);
   const bool fixed = two_cylinders(rounds) && norm(cross(rounds[0].axis, rounds[1].axis)).head > kOneDirection;
   int suit = 0;
   for (const double tangent : kTurns) {
-    const Axes axes = tangent == 0 ? first : choose(rounds, walls, tangent);
+    const Axes axes = tangent == 0 ? first : choose(rounds, walls, tangent, {});
     if (even(axes, walls, extent) && suit++ == way) return axes;
     if (fixed) break;
   }
@@ -291,9 +295,10 @@ std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall
   return found;
 }
 
-std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way) {
+std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way,
+                              const std::optional<Vec3>& long_axis) {
   if (walls.size() > kMostWalls) return std::nullopt;
-  const std::optional<Axes> chosen = axes_of(rounds, walls, extent, way);
+  const std::optional<Axes> chosen = axes_of(rounds, walls, extent, way, long_axis);
   if (!chosen) return std::nullopt;
   const Axes& axes = *chosen;
   Stack stack;
