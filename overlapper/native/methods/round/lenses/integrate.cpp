@@ -20,7 +20,8 @@ using slicing::Rule;
 using slicing::Series;
 
 /// If the relative error of a rule is not larger, no finer rule follows.
-constexpr double kVolumeError = 2e-15, kSlowVolumeError = 1e-14, kAreaError = 1e-11, kBorderError = 1e-11;
+constexpr double kVolumeError = 2e-15, kVolumeErrorInWalls = 1e-14, kSlowVolumeError = 1e-14, kAreaError = 1e-11,
+                 kBorderError = 1e-12, kBorderErrorClosely = 1e-11;
 constexpr int kMostHalvings = 40;
 constexpr int kMostRules = 400;
 
@@ -89,10 +90,9 @@ class Integrating {
     return part;
   }
 
-  /// The error of the volume. Where a square root lies near an interval, terms of the series fall fast at first, and
-  /// then as slowly as the last two do.
-  static double error_of_series(const Part& part) {
-    const Series& series = part.volume;
+  /// The error of a sum. Where a square root lies near an interval, terms of the series fall fast at first, and then as
+  /// slowly as the last two do.
+  static double error_of_series(const Series& series) {
     const double last = std::abs(series.last), before = std::abs(series.last_but_one);
     const double fall = last < before ? last / before : 1;
     return std::max(series.error(), series.tail() * std::pow(fall, 24));
@@ -123,27 +123,41 @@ class Integrating {
   }
 
   bool enough(const Part& part) const {
-    const double small = std::max(kVolumeError * volume_, 4 * DBL_EPSILON * part.sums.blur);
+    const double limit = discs_.cuts > 0 ? kVolumeErrorInWalls : kVolumeError;
+    const double small = std::max(limit * volume_, 4 * DBL_EPSILON * part.sums.blur);
     const bool rounded = part.volume.tail() <= 16 * DBL_EPSILON * part.sums.moments.volume;
-    if (!rounded && (error_of_series(part) > small || slow_error(part) > std::max(small, kSlowVolumeError * volume_)))
+    if (!rounded &&
+        (error_of_series(part.volume) > small || slow_error(part) > std::max(small, kSlowVolumeError * volume_)))
       return false;
-    if (wanted_.closing && part.border.stretched_error(part.sums.border) > kBorderError * border_ &&
-        part.border.tail() > 64 * DBL_EPSILON * part.sums.border)
+    if (wanted_.closing && border_error(part) > border_ && part.border.tail() > 64 * DBL_EPSILON * part.sums.border)
       return false;
     return !wanted_.first ||
            part.area.stretched_error(part.sums.first_area + part.sums.second_area) <= kAreaError * area_;
   }
 
+  /// The error of the border, in units of the largest error that is accurate enough.
+  double border_error(const Part& part) const {
+    return wanted_.closely ? part.border.stretched_error(part.sums.border) / kBorderErrorClosely
+                           : part.border.error() / kBorderError;
+  }
+
+  /// Whether the finest rule may be accurate enough: terms of the border have to fall as fast as before for 8 more
+  /// nodes, and then to the last term that the rule integrates.
+  bool suits_finer(const Part& part) const {
+    return part.volume.ratio() < 1e-3 &&
+           !(wanted_.closing && border_error(part) * std::pow(part.border.ratio(), 4.0 / 3) > border_);
+  }
+
   void add(const Part& part, bool may_be_finer, int halvings) {
     if (!enough(part) && rules_ < kMostRules) {
-      if (may_be_finer && part.volume.ratio() < 1e-3) return add(apply(part.range, slicing::kNodes32), false, halvings);
+      if (may_be_finer && suits_finer(part)) return add(apply(part.range, slicing::kNodes32), false, halvings);
       if (halvings < kMostHalvings) {
         for (const Range& half : part.range.halves()) add(apply(half, slicing::kNodes24), true, halvings + 1);
         return;
       }
     }
     result_.sums.add(1, part.sums, wanted_);
-    result_.error += std::max(error_of_series(part), slow_error(part));
+    result_.error += std::max(error_of_series(part.volume), slow_error(part));
     const double area = part.sums.first_area + part.sums.second_area;
     if (wanted_.first) result_.area_error += part.area.stretched_error(area);
   }

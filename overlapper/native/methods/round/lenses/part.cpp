@@ -58,6 +58,8 @@ namespace {
 /// A part is measured again about its centroid if its error is larger, relative to its own volume and to its share of
 /// all volume.
 constexpr double kFineForPart = 1e-12;
+/// A part is measured more closely if a larger fraction of the volume may be missing. This is half of kOfRules.
+constexpr double kClosed = kOfRules / 2;
 
 /// A part by slices of one direction, about an origin.
 struct Measured {
@@ -89,8 +91,10 @@ struct PartOfRound {
   Wanted wanted;
 
   /// No value if the part cannot be measured.
-  std::optional<Measured> measured(bool other) const {
-    return measured(of.centre, second_ball(round, of.stretch.half_axes), walls, wanted, other, {}, {});
+  std::optional<Measured> measured(bool other, bool closely) const {
+    Wanted what = wanted;
+    what.closely = closely;
+    return measured(of.centre, second_ball(round, of.stretch.half_axes), walls, what, other, {}, {});
   }
   /// The same about the centroid, with the foot along the part. The inner point may be far from the part, and places
   /// that count from there have fewer digits.
@@ -102,6 +106,7 @@ struct PartOfRound {
     std::vector<slicing::Wall> moved_walls(walls.begin(), walls.end());
     for (slicing::Wall& wall : moved_walls) wall.slack = wall.slack - dot(wall.normal, step);
     Wanted moved_wanted = wanted;
+    moved_wanted.closely = true;
     if (wanted.view) {
       moved_wanted.view->u0 += dot(wanted.view->u, origin);
       moved_wanted.view->v0 += dot(wanted.view->v, origin);
@@ -144,13 +149,16 @@ bool add_part(InEllipsoid& of, const slicing::Round& round, std::span<const slic
   wanted.closing = true;
   wanted.volume = totals.volume, wanted.border = totals.border;
   const PartOfRound whole{of, round, walls, wanted};
-  std::optional<Measured> found = whole.measured(false);
+  std::optional<Measured> found = whole.measured(false, false);
   if (!found) return false;
   const auto keep_better = [&](std::optional<Measured> again) {
     if (again && again->volume() > 0 && again->off() < found->off()) found = std::move(again);
   };
+  const auto is_open = [&](double limit) { return found->totals.open > limit * (totals.volume + found->volume()); };
+  // Volumes are accurate before area vectors are.
+  if (is_open(kClosed)) keep_better(whole.measured(false, true));
   // A part of the surface may be hidden between slices of one direction.
-  if (found->totals.open > pieces::kMostOpen * (totals.volume + found->volume())) keep_better(whole.measured(true));
+  if (is_open(pieces::kMostOpen)) keep_better(whole.measured(true, true));
   if (!(found->volume() > 0)) return true;
   if (const double error = found->totals.error;
       error > kFineForPart * std::max(found->volume(), (totals.volume + found->volume()) / of.parts))

@@ -40,6 +40,16 @@ void add(Region& region, Flat at, int curve) {
 /// Whether only rounding is between two points. An arc between them might as well be the whole circle, by its ends.
 bool same(Flat a, Flat b) { return norm(a - b) <= 16 * DBL_EPSILON * (norm(a) + norm(b)); }
 
+/// Whether a wall whose one side has both ends of an arc certainly has all of the arc there. Where the circle is
+/// farthest towards the other side, it is then not on the arc.
+bool clearly_off(const Circle& circle, Flat normal, Flat from, Flat to, bool inner) {
+  constexpr double kClearly = 1e-6;
+  const Flat farthest = circle.centre + (inner ? circle.radius : -circle.radius) * normal, chord = to - from,
+             way = farthest - from;
+  const double beside = cross(chord, way);
+  return beside > 0 && beside * beside > kClearly * dot(chord, chord) * (circle.radius * circle.radius);
+}
+
 /// Cuts off what is beyond a wall.
 void clip(Region& region, int wall, Flat normal, double side) {
   std::array<std::optional<Crossings>, 2> crossings;
@@ -79,6 +89,10 @@ void clip(Region& region, int wall, Flat normal, double side) {
     const auto add_arc = [&](Flat begin, Flat end) {
       if (!same(begin, end)) add(region, begin, curve);
     };
+    if (stays == ends && clearly_off(region.circle[curve], normal, from, to, stays)) {
+      if (stays) add(region, from, curve);
+      continue;
+    }
     const Crossings& found = with(curve);
     if (stays == ends && !(found.cross && on_arc(from, to, found.leave) && on_arc(from, to, found.enter))) {
       if (stays) add(region, from, curve);

@@ -19,6 +19,7 @@ struct Wanted {
   const quadric::Stretch *first = nullptr, *second = nullptr;  ///< for areas, if they are wanted
   std::optional<View> view;
   bool closing = false;
+  bool closely = false;           ///< the border is bounded by terms that fall as slowly as where a root is near
   double volume = 0, border = 0;  ///< measured before; errors are small relative to these plus the sums
 };
 
