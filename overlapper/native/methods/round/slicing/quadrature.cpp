@@ -79,7 +79,13 @@ RulePart apply(const Stack& stack, const Outline& outline, const Range& range, R
 class Integrating {
  public:
   Integrating(const Stack& stack, double volume, double area, bool few, double strictness, Sum& sum)
-      : stack_(stack), volume_(volume), area_(area), few_(few), strictness_(strictness), sum_(sum) {}
+      : stack_(stack),
+        volume_(volume),
+        area_(area),
+        few_(few),
+        alone_(volume == 0),
+        strictness_(strictness),
+        sum_(sum) {}
 
   bool run(std::span<const Interval> intervals) {
     thread_local std::vector<RulePart> parts;
@@ -100,8 +106,9 @@ class Integrating {
   }
 
  private:
-  /// With few nodes, a small rule is enough for small intervals. It is hardly ever enough for others.
-  Rule first(bool small) const { return few_ ? kRules[small ? 0 : 1] : kRules[2]; }
+  /// With few nodes, a small rule is enough for small intervals. It is hardly ever enough for others. If a piece is
+  /// alone, most of its intervals need 24 nodes.
+  Rule first(bool small) const { return kRules[few_ ? (small ? 0 : 1) + alone_ : 2]; }
 
   /// The number of missing nodes of a rule, in halves of its present number.
   double lacks(const RulePart& part) const {
@@ -173,6 +180,7 @@ class Integrating {
   double volume_, area_;  ///< about the totals of all pieces so far and of this one
   double cut_area_ = 0;   ///< of this piece
   bool few_;
+  bool alone_;  ///< no piece was measured before
   double strictness_;
   Sum& sum_;
 };
