@@ -358,10 +358,14 @@ Search search(const Arrangement& at) {
     if (d.gap > doubt(search.reach)) return search;
     search.hints = facing_planes(bodies, d);
     const bool by_cores = cores_reach(bodies[0], bodies[1], d, search.reach);
-    if (by_cores || cores_overlap(bodies[0], bodies[1], d, search.reach) ||
-        (!polyhedral(bodies) && one_holds_a_point(bodies[0], bodies[1], d, search.reach))) {
+    const bool cores_meet = cores_overlap(bodies[0], bodies[1], d, search.reach);
+    if (by_cores || cores_meet || (!polyhedral(bodies) && one_holds_a_point(bodies[0], bodies[1], d, search.reach))) {
       search.status = Status::kOverlapping, search.way = Way::kDual;
       if (by_cores) search.between = point_between(bodies[0], bodies[1], d);
+      if (smooth(bodies[0].shape) != smooth(bodies[1].shape)) {
+        if (by_cores) search.nearest = smooth(bodies[0].shape) ? d.witness_b : d.witness_a, search.depth = -d.distance;
+        else if (cores_meet) search.nearest = (d.witness_a + d.witness_b) / 2, search.depth = kInfinity;
+      }
       if (!search.between)
         search.between = point_both_hold(bodies[0], bodies[1], (d.witness_a + d.witness_b) / 2, search.reach);
       return search;
@@ -573,7 +577,21 @@ std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, Vec3 cen
 std::optional<VolumeAlone> volume_alone(const OverlappingBodies& overlapping) {
   if (!choose(traits(overlapping.bodies)).tries(Way::kClosedForm) || overlapping.bodies.size() != 2)
     return std::nullopt;
-  return volume_by_surface(overlapping.at.relative[0], overlapping.at.relative[1], overlapping.search().between);
+  const Placed &a = overlapping.at.relative[0], &b = overlapping.at.relative[1];
+  const Search& search = overlapping.search();
+  std::optional<Vec3> nearest = search.nearest;
+  double depth = search.depth;
+  // If the search ended at the centres, the point is searched for now, unless a deep point is known.
+  const bool flat_and_round = smooth(a.shape) != smooth(b.shape) && core_radius(a.shape) + core_radius(b.shape) > 0;
+  if (!nearest && search.between && flat_and_round) {
+    const double inside = std::min(distance_inside(a, *search.between).value_or(kInfinity),
+                                   distance_inside(b, *search.between).value_or(kInfinity));
+    constexpr double kDeep = 0x1p-40;
+    if (rounding(search.reach) < kDeep * inside) return std::nullopt;
+    const Distance d = distance(a, b);
+    if (cores_reach(a, b, d, search.reach)) nearest = smooth(a.shape) ? d.witness_b : d.witness_a, depth = -d.distance;
+  }
+  return volume_by_surface(a, b, search.between, nearest, depth);
 }
 
 namespace {

@@ -111,6 +111,8 @@ struct Search {
   double reach = 0;               ///< the largest of `reaches`
   std::vector<OwnedPlane> hints;  ///< planes for a search for a ball to start with
   std::optional<Vec3> between;    ///< a point certainly inside both bodies of a pair, if one was found
+  std::optional<Vec3> nearest;    ///< the point of a flat body that is deepest in a round one, or nearly so
+  double depth = 0;               ///< m: of that point
   std::optional<Inside> inside;   ///< no value if the status was known without it
 };
 /// Throws std::invalid_argument if the common set is unbounded.

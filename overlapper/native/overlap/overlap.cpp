@@ -95,7 +95,14 @@ const std::optional<MeasuresAndInertia>& Overlap::sliced_with_area() const {
 const std::optional<VolumeAlone>& Overlap::volume_alone() const {
   static const std::optional<VolumeAlone> none;
   const auto rounded = [](const Placed& body) { return rounded_hull(body.shape); };
-  if (!pair() || std::ranges::none_of(two_, rounded)) return none;
+  const auto round_ends = [](const Placed& body) {
+    const auto own = revolution(body.shape);
+    return own && own->round_ends && own->half_length > 0;
+  };
+  const auto flat = [](const Placed& body) { return bounded(body.shape) && !smooth(body.shape); };
+  if (!pair()) return none;
+  const bool capsule = std::ranges::any_of(two_, round_ends) && std::ranges::any_of(two_, flat);
+  if (!capsule && std::ranges::none_of(two_, rounded)) return none;
   return lazy().volume_alone.get([this] { return overlapper::volume_alone(overlapping_bodies()); });
 }
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rounded_shapes import CUBE_CORNERS, FLAT_TO_ROUNDING, points
 
-from overlapper import Box, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
+from overlapper import Box, Capsule, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
 TURNS = [(0, 0, 0, 1), (0, 0, 1, 1), (1, 1, 1, 1), (0.1, 0.2, 0.3, 0.4), (1e-9, 0, 0, 1)]
 FAR = np.array([1e6, -2e6, 0.5e6])
@@ -170,6 +170,46 @@ def test_deep_contacts_have_a_closed_form(kind):
     assert len(deep) > 20
     assert {found.way for found in deep} == {"closed form"}
     assert all(found.volume_error <= 1e-12 * found.volume for found in deep)
+
+
+@pytest.mark.parametrize("kind", ["box", "hull"])
+@pytest.mark.parametrize("depth", [1e-2, 1e-4, 1e-6])
+def test_shallow_contacts_have_a_closed_form_that_certificates_prove(kind, depth):
+    rng = np.random.default_rng(17)
+    ways = []
+    for _ in range(6):
+        found = pair(rng, kind, depth)
+        ways.append(found.way)
+        least, most = found.certificate().verify()
+        assert least - Fraction(found.volume_error) <= Fraction(found.volume) <= most + Fraction(found.volume_error)
+    assert ways.count("closed form") >= 5
+
+
+@pytest.mark.parametrize("kind", ["box", "hull"])
+@pytest.mark.parametrize("depth", [1e-3, 1e-5])
+def test_shallow_capsules_have_a_closed_form_that_certificates_prove(kind, depth):
+    rng = np.random.default_rng(19)
+    ways = []
+    for _ in range(6):
+        capsule = Capsule(rng.uniform(0.1, 0.4), rng.uniform(0.4, 1.0))
+        a, b = Placed(capsule, rng.normal(size=3) * 0.3, rng.normal(size=4)), flat_body(rng, kind)
+        found = overlap(a, b)
+        if not found:
+            continue
+        found = overlap(Placed(capsule, a.position + (found.depth - depth) * found.normal, a.orientation), b)
+        ways.append(found.way)
+        least, most = found.certificate().verify()
+        assert least - Fraction(found.volume_error) <= Fraction(found.volume) <= most + Fraction(found.volume_error)
+    assert ways.count("closed form") >= len(ways) - 1 > 2
+
+
+def test_a_huge_radius_around_a_small_core_agrees_with_the_certificate():
+    """The apex is almost on the axis of a band, where the angle of its direction has few digits."""
+    core = np.array([(0, 0, 3), (1, 0, 0), (0, 2, 0), (0, 0, -3), (0, -2, 0), (-1, 0, 0)])
+    r, turn = 32889971.033252977, (-0.71390674604165949, 0.34653449558074734, 0.49169519125232752, 0.35845061058414091)
+    found = overlap(Placed(RoundedHull(core, r), (0, 0, 0), turn), Box((r, r, r)))
+    least, most = found.certificate().verify()
+    assert least - Fraction(found.volume_error) <= Fraction(found.volume) <= most + Fraction(found.volume_error)
 
 
 def test_aligned_and_flush_bodies_agree_with_certificates():

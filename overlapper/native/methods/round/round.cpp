@@ -52,12 +52,17 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
   return best;
 }
 
-std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b, const std::optional<Vec3>& between) {
-  const bool first = rounded_hull(a.shape);
+std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b, const std::optional<Vec3>& between,
+                                             const std::optional<Vec3>& nearest, double depth) {
+  const bool first = rounded_hull(a.shape) || (smooth(a.shape) && !smooth(b.shape));
   const Placed &rounded = first ? a : b, &other = first ? b : a;
-  if (!rounded_hull(rounded.shape)) return std::nullopt;
+  if (!rounded_hull(rounded.shape)) {
+    const auto own = revolution(rounded.shape);
+    if (smooth(other.shape) || !own || !own->round_ends || own->half_length == 0) return std::nullopt;
+    return offset::volume_in_polytope(rounded, other, nearest, depth);
+  }
   if (stretched(other.shape)) return offset::volume_in_ellipsoid(rounded, other);
-  if (!smooth(other.shape)) return offset::volume_in_polytope(rounded, other);
+  if (!smooth(other.shape)) return offset::volume_in_polytope(rounded, other, nearest, depth);
   if (rounded_hull(other.shape)) return offset::volume_of_two_rounded(rounded, other, between);
   const auto revolved = revolution(other.shape);
   if (!revolved) return std::nullopt;

@@ -86,7 +86,8 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
 /// The volume of an overlapping pair by the surface of a rounded hull, if one body is a rounded hull and the other one
 /// a half-space, a box, a hull, a ball, an ellipsoid, a capsule, a cylinder or a rounded hull. `between` is a point
 /// inside both bodies, if one is known.
-std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b, const std::optional<Vec3>& between);
+std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b, const std::optional<Vec3>& between,
+                                             const std::optional<Vec3>& nearest, double depth);
 
 /// The measures of an overlapping pair by slices.
 std::optional<pieces::RoundMeasures> measure_by_slices(const pieces::SlicedPair& pair);
