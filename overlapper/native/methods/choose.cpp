@@ -586,7 +586,7 @@ std::optional<VolumeAlone> volume_alone(const OverlappingBodies& overlapping) {
   if (!nearest && search.between && flat_and_round) {
     const double inside = std::min(distance_inside(a, *search.between).value_or(kInfinity),
                                    distance_inside(b, *search.between).value_or(kInfinity));
-    constexpr double kDeep = 0x1p-40;
+    constexpr double kDeep = 0x1p-43;
     if (rounding(search.reach) < kDeep * inside) return std::nullopt;
     const Distance d = distance(a, b);
     if (cores_reach(a, b, d, search.reach)) nearest = smooth(a.shape) ? d.witness_b : d.witness_a, depth = -d.distance;

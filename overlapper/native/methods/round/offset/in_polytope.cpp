@@ -238,7 +238,8 @@ class InPolytope {
 
   /// `reach` is the largest distance from the apex of the planes along the part.
   void add_cone(double cone, double size, double reach) {
-    thrice_ += cone, size_ += size, farthest_ = std::max(farthest_, std::abs(reach));
+    thrice_ += cone, size_ += size;
+    if (cone != 0) farthest_ = std::max(farthest_, std::abs(reach));
   }
   /// Adds to the border of a face: its step, and twice the area that it spans with the foot of the apex.
   void add_border(int j, Vec3 step, double twice, double size) {
@@ -1036,7 +1037,7 @@ std::optional<VolumeAlone> volume_in_polytope(const Placed& rounded_body, const 
                       reach(polytope.shape);
   const double off = rounding(reach(rounded_body, reach(polytope, size))) + flatness(polytope.shape);
   // Other capsules have a closed form for all measures.
-  constexpr double kShallowCapsule = 0x1p-40;
+  constexpr double kShallowCapsule = 0x1p-43;
   if (!hull && !(near && off > kShallowCapsule * depth)) return std::nullopt;
   const double tie = 4 * off;
   const std::span<const Vec3> vertices = core.vertices;
