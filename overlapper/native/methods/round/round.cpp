@@ -67,7 +67,7 @@ std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b, c
   const auto revolved = revolution(other.shape);
   if (!revolved) return std::nullopt;
   return revolved->round_ends && revolved->half_length == 0 ? offset::volume_in_ball(rounded, other)
-                                    : offset::volume_of_two_rounded(rounded, other, between);
+                                                            : offset::volume_of_two_rounded(rounded, other, between);
 }
 
 std::optional<pieces::RoundMeasures> measure_by_slices(const pieces::SlicedPair& pair) {
