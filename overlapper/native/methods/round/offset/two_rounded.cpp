@@ -164,6 +164,8 @@ void aim(Band& band) {
 void refine(int feature, Side& side) {
   if (std::exchange(side.refined[feature], 1)) return;
   if (feature < side.first_band()) {
+    // The border of a disc is the end of its band.
+    if (side.discs) refine(side.first_band(), side);
     MovedFacet& facet = side.facets[feature];
     facet.plane.offset = wide_plane(side, feature).offset.head, facet.nearest = facet.plane.offset * facet.plane.normal;
   } else if (feature < side.first_patch()) {
@@ -176,6 +178,9 @@ void refine(int feature, Side& side) {
     band.begin = t.head, band.end = dot(wide_corner(side, to), along).head, band.foot = side.rotation * rounded(foot);
     aim(band);
     band.rise = (DoubleDouble{side.r} - norm(foot)).head, band.near = band.rise * band.toward;
+    side.ends[2 * e].plane.offset = band.begin, side.ends[2 * e + 1].plane.offset = -band.end;
+    // Angles near the origin begin at 0.
+    if (side.discs) band.middle = band.toward, band.across = cross(band.along, band.toward);
     if (!side.revolved())
       for (const int i : {2 * e, 2 * e + 1}) side.lines[i].plane.offset = dot(side.lines[i].plane.normal, band.foot);
   } else {
@@ -192,15 +197,15 @@ struct Limit {
   int element;
   int body;
   double radius = 0;  ///< of the sphere; 0 for a plane
-  Vec3 centre{};
-  double inside = -1;  ///< m: how far a conic reaches inside a plane, if that is known to more digits
+  Vec3 place{};       ///< of the sphere, with the normal of `plane`: heights near it keep their digits
 
   double height(Vec3 point) const {
     if (radius == 0) return signed_distance(plane, point);
-    return (norm2(point - centre) - radius * radius) / (2 * radius);
+    const Vec3 from = point - place;
+    return norm2(from) / (2 * radius) + dot(plane.normal, from);
   }
   double slope(Vec3 point, Vec3 rate) const {
-    return dot(radius == 0 ? plane.normal : (point - centre) / radius, rate);
+    return dot(radius == 0 ? plane.normal : plane.normal + (point - place) / radius, rate);
   }
 };
 constexpr Limit kSeam{{}, -1, -1};
@@ -387,7 +392,9 @@ class TwoRounded {
   /// The border of a disc.
   Limit rim(int body, int f) const {
     const Side& side = work_.sides[body];
-    return {{}, side.ends[f].element, body, side.r, side.vertices[f]};
+    const Band& band = side.bands[0];
+    const Vec3 place = band.near + (f == 0 ? band.begin : band.end) * band.along;
+    return {{band.toward, 0}, side.ends[f].element, body, side.r, place};
   }
 
   /// True if a feature certainly has no point in a box.
@@ -495,13 +502,14 @@ class TwoRounded {
     for (const int body : {0, 1}) {
       if (!is_disc(body, features_[body])) continue;
       rims[body] = rim(body, features_[body]);
-      const double r = rims[body].radius, at = dot(rims[body].centre - line.start, line.x);
-      const double distance = std::sqrt(norm2(line.start + at * line.x - rims[body].centre));
-      if (std::abs(r - distance) < tie_) return false;
-      if (distance > r) return true;
-      const double half = std::sqrt((r - distance) * (r + distance));
-      if (at + half < high) high = at + half, highest = &rims[body];
-      if (at - half > low) low = at - half, lowest = &rims[body];
+      // The roots of s² + 2 b s + c
+      const double r = rims[body].radius, c = 2 * r * rims[body].height(line.start);
+      const double b = r * rims[body].slope(line.start, line.x), square = b * b - c;
+      if (std::abs(square) < 2 * r * tie_) return false;
+      if (square < 0) return true;
+      const double larger = -(b + std::copysign(std::sqrt(square), b)), smaller = c / larger;
+      if (std::max(larger, smaller) < high) high = std::max(larger, smaller), highest = &rims[body];
+      if (std::min(larger, smaller) > low) low = std::min(larger, smaller), lowest = &rims[body];
     }
     if (std::abs(high - low) < tie_) return false;
     if (!(low < high)) return true;
@@ -536,11 +544,12 @@ class TwoRounded {
         first = {{}, side.lines[2 * e].element, 1 - body}, last = {{}, side.lines[2 * e + 1].element, 1 - body};
       }
       if (disc) {
-        const double distance = std::sqrt(norm2(conic.start - border.centre));
+        const double distance = std::sqrt(norm2(conic.start - (border.place - border.radius * border.plane.normal)));
         const double most = std::sqrt(norm2(conic.x) + norm2(conic.y));
         if (distance - most > border.radius + tie_) return true;
         if (!(distance + most < border.radius - tie_)) work_.limits.push_back(border);
-      } else if (wide_) {
+      }
+      if (wide_) {
         const double at = sharpen_ellipse(conic, body, feature - side.first_band());
         low -= at, high -= at;
       }
@@ -552,23 +561,23 @@ class TwoRounded {
       if (depth < 0 || depth > 2 * side.r) return true;
       circle(conic, plane.offset * plane.normal + (centre - dot(plane.normal, centre) * plane.normal), plane.normal,
              std::sqrt(depth * (2 * side.r - depth)));
+      const Vec3 apart = conic.start - (border.place - border.radius * border.plane.normal);
+      if (wide_) {
+        const auto [across, offset] = wide_facet(body, features_[body]);
+        const WideVector middle = side.wide_rotation * wide_corner(side, v);
+        sharpen_circle(conic, across, offset, middle, side.r, DoubleDouble{side.r} - (dot(across, middle) - offset), 0);
+      }
       if (disc) {
         // Two circles in a plane cross where the line through both points cuts them.
-        const Vec3 apart = conic.start - border.centre;
         const double distance = std::sqrt(norm2(apart)), radius = std::sqrt(norm2(conic.x));
         const double within = border.radius - std::abs(distance - radius), all = border.radius - distance - radius;
         if (std::abs(within) < tie_ || std::abs(all) < tie_) return false;
         if (within < 0) return true;
         if (all < 0) {
-          const Vec3 normal = apart / distance;
-          const double inside = within * (2 * border.radius - within) / (2 * distance);
-          const Plane chord{normal, dot(normal, conic.start) + inside - radius};
-          work_.limits.push_back({chord, border.element, body, 0, {}, inside});
+          const Vec3 normal = apart / distance, begin = conic.exact ? conic.start : conic.start + conic.x;
+          const double height = border.radius * border.height(begin) / distance;
+          work_.limits.push_back({{normal, dot(normal, begin) - height}, border.element, body});
         }
-      } else if (wide_) {
-        const auto [across, offset] = wide_facet(body, features_[body]);
-        const WideVector middle = side.wide_rotation * wide_corner(side, v);
-        sharpen_circle(conic, across, offset, middle, side.r, DoubleDouble{side.r} - (dot(across, middle) - offset), 0);
       }
     }
     return divide(conic, low, high, first, last);
@@ -931,9 +940,7 @@ class TwoRounded {
           const double sum = b + std::copysign(root, b);
           angles = {2 * std::atan2(sum, steep), 2 * std::atan2(-height, sum)};
         } else {
-          const double size = std::sqrt(a * a + b * b), middle = std::atan2(b, a), inside = work_.limits[l].inside;
-          const double off =
-              inside < 0 ? std::acos(-height / size) : kPi - 2 * std::asin(std::sqrt(inside / (2 * size)));
+          const double size = std::sqrt(a * a + b * b), middle = std::atan2(b, a), off = std::acos(-height / size);
           angles = {middle - off, middle + off};
         }
         for (const double root : angles)
@@ -1063,7 +1070,10 @@ class TwoRounded {
       const Vec3 from = end.point - band.foot, outward = normal_at(work_.sides[other], features_[other], end.point);
       const bool line = limit->element < lines;
       const Vec3 along = line ? band.along : overlapper::cross(band.along, from) / side.r;
-      const double at = line ? dot(from, band.along) : std::atan2(dot(from, band.across), dot(from, band.middle));
+      // From a band's middle to the origin, places near the origin keep their digits.
+      const Vec3 near = side.discs && wide_ ? end.point - band.near : from;
+      const double ahead = dot(near, band.middle) + (side.discs && wide_ ? side.r : 0);
+      const double at = line ? dot(end.point, band.along) : std::atan2(dot(near, band.across), ahead);
       const double slope = dot(along, outward);
       if (!(std::abs(slope) > kAlike)) return false;
       double moment = 0;
@@ -1395,6 +1405,8 @@ class TwoRounded {
     Curve arc{};
     arc.kind = Curve::Kind::kConic, arc.start = band.foot + t * band.along;
     arc.x = side.r * band.middle, arc.y = side.r * band.across;
+    // The bound of places holds for each of both features alone, so no distance from the other one is added.
+    if (side.discs && wide_) arc.start = band.near + t * band.along, arc.exact = true;
     return integrate(arc, from, to, std::span(targets).first(count), 0);
   }
 
@@ -1603,7 +1615,7 @@ bool place_features(double slack, const Bounds& other, Vec3 outward, double dept
       side.lines[2 * e] = {{left, dot(left, band.foot)}, 2 * e};
       side.lines[2 * e + 1] = {{right, dot(right, band.foot)}, 2 * e + 1};
     }
-    if (!kept) continue;
+    if (!kept && !side.discs) continue;
     aim(band);
     band.rise = r - band.lever, band.near = band.rise * band.toward;
   }
