@@ -111,8 +111,9 @@ struct PolytopeWork {
   std::vector<BandCut> cuts;
   std::vector<Turn> breaks;
   struct Corner {
-    Vec3 at;    ///< from the foot of the apex
-    Line line;  ///< on which the border goes on
+    Vec3 at;           ///< from the foot of the apex
+    Line line;         ///< on which the border goes on
+    double above = 0;  ///< m: above the line that cuts
   };
   std::vector<Corner> polygon, clipped;
   // A capsule's core.
@@ -178,6 +179,7 @@ class InPolytope {
         cutting_(cutting),
         work_(work),
         faces_(static_cast<int>(work.faces.size())),
+        farthest_(wide ? 0 : size),
         extent2_(wide ? 0 : size * size) {}
 
   bool add_all() {
@@ -273,7 +275,7 @@ class InPolytope {
     return false;
   }
   /// m: nothing is certain about a point nearer to a plane.
-  double tie_of(Vec3 x) const { return 4 * off_ + kRoundingOfTerms * std::sqrt(norm2(x)); }
+  double tie_of(Vec3 x) const { return 4 * off_ + kRoundingOfTerms * std::sqrt(wide_ ? norm2(x) : extent2_); }
 
   // ------------------------------------------------------------------------------------------- as seen from the apex
 
@@ -375,14 +377,13 @@ class InPolytope {
       const Line line{face.normal - cosine * n, face.offset - reach * cosine, j};
       clipped.clear();
       const size_t count = polygon.size();
-      const auto above_line = [&](Vec3 at) { return dot(line.normal, at) - line.offset; };
-      const auto touches = [&](const PolytopeWork::Corner& corner) {
-        return std::abs(above_line(corner.at)) < tie_of(corner.at);
-      };
-      if (std::ranges::any_of(polygon, touches)) return false;
+      for (PolytopeWork::Corner& corner : polygon) {
+        corner.above = dot(line.normal, corner.at) - line.offset;
+        if (std::abs(corner.above) < tie_of(corner.at)) return false;
+      }
       for (size_t i = 0; i < count; ++i) {
-        const PolytopeWork::Corner here = polygon[i], next = polygon[(i + 1) % count];
-        const double above = above_line(here.at), then = above_line(next.at);
+        const PolytopeWork::Corner &here = polygon[i], &next = polygon[i + 1 == count ? 0 : i + 1];
+        const double above = here.above, then = next.above;
         const auto crossing = [&] { return crossing_of(here.line, line, n, here.at, next.at, above, then); };
         if (above < 0) {
           clipped.push_back(here);
@@ -397,8 +398,8 @@ class InPolytope {
     const Vec3 first = polygon[0].at, foot = reach * n;
     double twice = 0, size = 0;
     for (size_t i = 0; i < polygon.size(); ++i) {
-      const PolytopeWork::Corner &before = polygon[(i + polygon.size() - 1) % polygon.size()], &here = polygon[i],
-                                 &next = polygon[(i + 1) % polygon.size()];
+      const PolytopeWork::Corner &before = polygon[i == 0 ? polygon.size() - 1 : i - 1], &here = polygon[i],
+                                 &next = polygon[i + 1 == polygon.size() ? 0 : i + 1];
       twice += dot(n, cross(here.at - first, next.at - first));
       size += std::sqrt(norm2(here.at) * norm2(next.at - here.at));
       const Vec3 x = foot + here.at, y = foot + next.at;
@@ -481,7 +482,7 @@ class InPolytope {
       area_ += area * edge.angle, sizes_ += area * edge.angle;
       unbalanced_ += area * edge.chord * edge.middle;
       const double first = dot(from_apex, edge.middle) * edge.chord, second = r_ * edge.angle;
-      add_cone(area * (first + second), area * (std::abs(first) + second), std::sqrt(norm2(from_apex)) + r_);
+      add_cone(area * (first + second), area * (std::abs(first) + second), 0);
       return true;
     }
     const SeenBand& band = this->band(e);
@@ -545,9 +546,71 @@ class InPolytope {
     return true;
   }
 
+  /// An end of the lines of a band, at t = place + across sin φ + ahead (1 - cos φ).
+  struct End {
+    double place, across = 0, ahead = 0;
+
+    double at(const Turn& turn) const { return place + across * turn.sine + ahead * turn.versine; }
+  };
+  End end_of(const BandCut* cut, double own) const {
+    if (!cut) return {own};
+    return {-cut->height / cut->slope, -r_ * cut->across / cut->slope, -r_ * cut->ahead / cut->slope};
+  }
+
+  /// The same as add_part, by closed sums. They lose digits where the band is small beside its distance from the apex.
+  /// False if terms are far larger than the band, so that the sums lose digits.
+  bool add_sums(const OffsetSurface::Edge& edge, const SeenBand& band, const Turn& begin, const Turn& end,
+                const BandCut* lowest, const BandCut* highest) {
+    const End high = end_of(highest, band.last), low = end_of(lowest, band.first);
+    // No angle is above π/2, so no sine or 1 - cosine is larger than this, and no integral's rounding than that of
+    // `whole`.
+    const double most = std::min(band.half, 1.0), whole = 2 * band.half;
+    const double places =
+        std::abs(high.place) + std::abs(low.place) +
+        most * (std::abs(high.across) + std::abs(low.across) + std::abs(high.ahead) + std::abs(low.ahead));
+    constexpr double kFar = 64;
+    if (places > kFar * (edge.length + r_)) return false;
+    // The integrals of 1, sin φ, 1 - cos φ and of their products.
+    const double one = end.angle - begin.angle, sine = end.versine - begin.versine, cosine = end.sine - begin.sine;
+    const double versine = one - cosine;
+    const double twice = end.sine * (1 - end.versine) - begin.sine * (1 - begin.versine);
+    const double sine_sine = (one - twice) / 2;
+    const double sine_versine = sine - (end.sine - begin.sine) * (end.sine + begin.sine) / 2;
+    const double versine_versine = versine - cosine + (one + twice) / 2;
+    const double place = high.place - low.place, across = high.across - low.across, ahead = high.ahead - low.ahead;
+    const double plain = r_ * (place * one + across * sine + ahead * versine);
+    const double of_sine = r_ * (place * sine + across * sine_sine + ahead * sine_versine);
+    const double of_versine = r_ * (place * versine + across * sine_versine + ahead * versine_versine);
+    const double farthest = std::abs(band.base) + most * (std::abs(band.tilt) + std::abs(band.slope));
+    area_ += std::abs(plain), sizes_ += r_ * whole * places;
+    unbalanced_ += (plain - of_versine) * band.pole + of_sine * band.side;
+    add_cone(band.base * plain + band.tilt * of_sine + band.slope * of_versine, r_ * whole * places * farthest,
+             farthest);
+    for (const Turn& at : {begin, end}) {
+      if (std::abs(at.angle) != band.half) continue;
+      const double length = high.at(at) - low.at(at);
+      tilted_ += std::abs(length * band.reach(at)), seams_ += std::abs(length);
+    }
+    const auto add_end = [&](const BandCut* cut, const End& ends, double sign) {
+      if (!cut) return;
+      // The border is start + by_sine sin φ + by_versine (1 - cos φ).
+      const Vec3 start = band.start + ends.place * edge.along;
+      const Vec3 by_sine = r_ * band.side + ends.across * edge.along;
+      const Vec3 by_versine = ends.ahead * edge.along - r_ * band.pole;
+      const Vec3 step = cosine * by_sine + sine * by_versine;
+      const Vec3 spanned = cross(start, step) + versine * cross(by_sine, by_versine);
+      const double first = r_ + std::abs(ends.across), second = r_ + std::abs(ends.ahead);
+      add_border(cut->plane, sign * step, sign * dot(work_.faces[cut->plane].normal, spanned),
+                 whole * (std::sqrt(norm2(start)) * (first + second) + first * second));
+    };
+    add_end(highest, high, 1), add_end(lowest, low, -1);
+    return true;
+  }
+
   /// Adds the part of a band between two angles and two planes; its own end if a plane is null.
   void add_part(const OffsetSurface::Edge& edge, const SeenBand& band, const Turn& begin, const Turn& end,
                 const BandCut* lowest, const BandCut* highest) {
+    if (!wide_ && add_sums(edge, band, begin, end, lowest, highest)) return;
     double cones = 0, size = 0, area = 0, cosines = 0, sines = 0, most_reach = 0;
     struct Side {
       const BandCut* cut;
@@ -633,7 +696,7 @@ class InPolytope {
       const Vec3 normals = core_.surface ? mean : kPi * mean, from_apex = core_.vertices[v] - apex_;
       area_ += square * angle, sizes_ += square * angle, unbalanced_ += square * normals;
       const double first = dot(from_apex, normals), second = r_ * angle;
-      add_cone(square * (first + second), square * (std::abs(first) + second), std::sqrt(norm2(from_apex)) + r_);
+      add_cone(square * (first + second), square * (std::abs(first) + second), 0);
       return true;
     }
     const Sight seen = sight_of_vertex(v, unit(mean));
@@ -857,15 +920,15 @@ class InPolytope {
   PolytopeWork& work_;
   int faces_;
   double thrice_ = 0;
-  double size_ = 0;      ///< m³: sum of the sizes of all terms
-  double area_ = 0;      ///< m²
-  double sizes_ = 0;     ///< m²: sum of the sizes of all areas
-  double tilted_ = 0;    ///< m²: sum over the borders of facets, of their lengths times their distances
-  double farthest_ = 0;  ///< m: largest distance of a tangent plane, or of a plane of the polytope, from the apex
-  double seams_ = 0;     ///< m: sum of these lengths
-  double border_ = 0;    ///< m: sum of the sizes of all steps along borders of faces
-  double extent2_;       ///< m²: largest square of a distance from the apex
-  Vec3 unbalanced_;      ///< m²
+  double size_ = 0;    ///< m³: sum of the sizes of all terms
+  double area_ = 0;    ///< m²
+  double sizes_ = 0;   ///< m²: sum of the sizes of all areas
+  double tilted_ = 0;  ///< m²: sum over the borders of facets, of their lengths times their distances
+  double farthest_;    ///< m: largest distance of a tangent plane, or of a plane of the polytope, from the apex
+  double seams_ = 0;   ///< m: sum of these lengths
+  double border_ = 0;  ///< m: sum of the sizes of all steps along borders of faces
+  double extent2_;     ///< m²: largest square of a distance from the apex
+  Vec3 unbalanced_;    ///< m²
 };
 
 /// The polytope's planes in the coordinates of the core. False if it has too many facets, or no edges.
