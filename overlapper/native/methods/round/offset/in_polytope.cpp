@@ -112,10 +112,11 @@ struct PolytopeWork {
   std::vector<Turn> breaks;
   struct Corner {
     Vec3 at;           ///< from the foot of the apex
-    Line line;         ///< on which the border goes on
+    int line;          ///< on which the border goes on, or kNone
     double above = 0;  ///< m: above the line that cuts
   };
   std::vector<Corner> polygon, clipped;
+  std::vector<Line> lines;
   // A capsule's core.
   std::array<Vec3, 2> ends;
   std::array<OffsetSurface::Edge, 1> axis;
@@ -361,20 +362,23 @@ class InPolytope {
       return true;
     }
     auto &polygon = work_.polygon, &clipped = work_.clipped;
-    polygon.clear();
+    polygon.clear(), work_.lines.clear();
     for (size_t i = 0; i < ring.size(); ++i) {
       const Vec3 at = core_.vertices[ring[i]] - apex_;
-      polygon.push_back({at - dot(at, n) * n, {}});
+      polygon.push_back({at - dot(at, n) * n, kNone});
       if (!wide_) continue;
       const int side = core_.surface->sides[core_.hull->ring_start[f] + i];
       const SeenBand& beside = band(side / 2);
       const Vec3 out = (side % 2 == 1 ? -1.0 : 1.0) * cross(core_.edges[side / 2].along, n);
-      polygon.back().line = {out, -beside.slope * dot(out, beside.pole), kNone};
+      polygon.back().line = static_cast<int>(work_.lines.size());
+      work_.lines.push_back({out, -beside.slope * dot(out, beside.pole), kNone});
     }
     for (const int j : work_.active) {
       const Face& face = work_.faces[j];
       const double cosine = dot(face.normal, n);
       const Line line{face.normal - cosine * n, face.offset - reach * cosine, j};
+      const int cutter = static_cast<int>(work_.lines.size());
+      work_.lines.push_back(line);
       clipped.clear();
       const size_t count = polygon.size();
       for (PolytopeWork::Corner& corner : polygon) {
@@ -387,7 +391,7 @@ class InPolytope {
         const auto crossing = [&] { return crossing_of(here.line, line, n, here.at, next.at, above, then); };
         if (above < 0) {
           clipped.push_back(here);
-          if (!(then < 0)) clipped.push_back({crossing(), line});
+          if (!(then < 0)) clipped.push_back({crossing(), cutter});
         } else if (then < 0) {
           clipped.push_back({crossing(), here.line});
         }
@@ -395,6 +399,9 @@ class InPolytope {
       polygon.swap(clipped);
       if (polygon.size() < 3) return true;
     }
+    const auto plane_of = [&](const PolytopeWork::Corner& corner) {
+      return corner.line == kNone ? kNone : work_.lines[corner.line].plane;
+    };
     const Vec3 first = polygon[0].at, foot = reach * n;
     double twice = 0, size = 0;
     for (size_t i = 0; i < polygon.size(); ++i) {
@@ -404,10 +411,10 @@ class InPolytope {
       size += std::sqrt(norm2(here.at) * norm2(next.at - here.at));
       const Vec3 x = foot + here.at, y = foot + next.at;
       reaches(x);
-      const int j = here.line.plane;
+      const int j = plane_of(here);
       if (j == kNone) continue;
       add_border(j, x - y, dot(work_.faces[j].normal, cross(y, x - y)), std::sqrt(norm2(y) * norm2(x - y)));
-      if (before.line.plane != kNone && !pierce(before.line.plane, j, x, n)) return false;
+      if (const int k = plane_of(before); k != kNone && !pierce(k, j, x, n)) return false;
     }
     const double area = twice / 2;
     area_ += std::abs(area), unbalanced_ += area * n, sizes_ += size;
@@ -417,8 +424,9 @@ class InPolytope {
 
   /// Where two borders cross. Between nearly parallel ones, or if doubles are enough, it is the place between two
   /// corners.
-  Vec3 crossing_of(const Line& one, const Line& other, Vec3 n, Vec3 here, Vec3 next, double above, double then) const {
+  Vec3 crossing_of(int border, const Line& other, Vec3 n, Vec3 here, Vec3 next, double above, double then) const {
     if (!wide_) return here + above / (above - then) * (next - here);
+    const Line& one = work_.lines[border];
     constexpr double kParallel = 1e-6;
     const double sine = dot(cross(one.normal, other.normal), n);
     if (!(std::abs(sine) > kParallel * std::sqrt(norm2(one.normal) * norm2(other.normal))))
@@ -568,8 +576,8 @@ class InPolytope {
     const double places =
         std::abs(high.place) + std::abs(low.place) +
         most * (std::abs(high.across) + std::abs(low.across) + std::abs(high.ahead) + std::abs(low.ahead));
-    constexpr double kFar = 64;
-    if (places > kFar * (edge.length + r_)) return false;
+    constexpr double kFar = 4;
+    if (places > kFar * edge.length) return false;
     // The integrals of 1, sin φ, 1 - cos φ and of their products.
     const double one = end.angle - begin.angle, sine = end.versine - begin.versine, cosine = end.sine - begin.sine;
     const double versine = one - cosine;
