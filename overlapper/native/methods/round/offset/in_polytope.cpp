@@ -180,7 +180,7 @@ class InPolytope {
         cutting_(cutting),
         work_(work),
         faces_(static_cast<int>(work.faces.size())),
-        farthest_(wide ? 0 : size),
+        farthest_(wide ? 0 : norm(apex) + reach(rounded.shape)),
         extent2_(wide ? 0 : size * size) {}
 
   bool add_all() {
