@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
 #include <vector>
 
 #include "geometry/constants.h"
+#include "geometry/lanes.h"
 #include "geometry/rounding.h"
 #include "geometry/scratch.h"
 #include "geometry/wide_pose.h"
@@ -20,11 +22,17 @@ constexpr double kOfDirections = 8 * kUnit;
 /// Rounding of a term, relative to its size. No term takes more than 60 operations that each may round.
 constexpr double kOfTermsInBall = 64 * kUnit;
 
-struct Sum {
-  double value = 0, size = 0;
-  void add(double term) { value += term, size += std::abs(term); }
-  void add(const Sum& other, double factor) { value += factor * other.value, size += std::abs(factor) * other.size; }
+double magnitude(double x) { return std::abs(x); }
+TwoLanes root(TwoLanes x) { return TwoLanes{std::sqrt(x[0]), std::sqrt(x[1])}; }
+TwoLanes magnitude(TwoLanes x) { return TwoLanes{std::abs(x[0]), std::abs(x[1])}; }
+
+template <class T>
+struct SumOf {
+  T value{}, size{};
+  void add(T term) { value += term, size += magnitude(term); }
+  void add(const SumOf& other, T factor) { value += factor * other.value, size += magnitude(factor) * other.size; }
 };
+using Sum = SumOf<double>;
 
 /// A direction in a plane, not unit.
 struct Flat {
@@ -78,7 +86,14 @@ struct BallFacet {
   int plane = -1;              ///< number of its plane in double-double
   WideVector foot;             ///< from the centre; zero if there is no such plane
   double slack = 0, near = 0;  ///< R − ρ and ρ at the point of its moved plane nearest to the centre
+  bool reached = false;        ///< an edge of it is in `BallWork::edges`
   Turns turns;                 ///< of its corners, about the foot of the centre
+};
+
+/// An angle from −π to π.
+struct BallAngle {
+  double psi, half_sine, sine;
+  explicit BallAngle(double of) : psi(of), half_sine(std::sin(of / 2)), sine(2 * half_sine * std::cos(of / 2)) {}
 };
 
 /// Where an edge of the core is, seen from the ball's centre.
@@ -141,19 +156,29 @@ class Integral {
  private:
   template <class Nodes, class F>
   static void by(const Nodes& nodes, double middle, double half, F f, Sum& sum) {
-    double value = 0, size = 0;
+    SumOf<TwoLanes> both;
     f.set(middle);
     for (const slicing::Node& node : nodes) {
-      const auto [low, high] = f(half * (1 - 2 * node.fraction));
+      const SumOf<TwoLanes> terms = f(half * (1 - 2 * node.fraction));
       // The weights of these nodes are for an integral over cos θ.
       const double weight = node.weight / node.sine;
-      value += weight * (low.value + high.value), size += weight * (low.size + high.size);
+      both.value += weight * terms.value, both.size += weight * terms.size;
     }
-    sum.value += 4 * half / kPi * value, sum.size += 4 * half / kPi * size;
+    sum.value += 4 * half / kPi * (both.value[0] + both.value[1]);
+    sum.size += 4 * half / kPi * (both.size[0] + both.size[1]);
   }
 
   std::array<Singularity, 2> singularities_;
 };
+
+/// The next terms of the series are less than 2^-56 of the sine and 2^-64 of the cosine.
+std::array<double, 2> sine_and_cosine(double x) {
+  if (!(x < 0.25)) return {std::sin(x), std::cos(x)};
+  const double y = x * x;
+  const double sine = y * (1.0 / 6 - y * (1.0 / 120 - y * (1.0 / 5040 - y * (1.0 / 362880 - y * (1.0 / 39916800)))));
+  const double cosine = y * (1.0 / 24 - y * (1.0 / 720 - y * (1.0 / 40320 - y * (1.0 / 3628800 - y / 479001600))));
+  return {x - x * sine, 1 - y * (0.5 - cosine)};
+}
 
 /// A function of sin χ and cos χ.
 template <class F>
@@ -161,9 +186,10 @@ struct OfAngle {
   F f;
   double sine = 0, cosine = 1;
   void set(double middle) { sine = std::sin(middle), cosine = std::cos(middle); }
-  std::array<Sum, 2> operator()(double by) const {
-    const double s = std::sin(by), c = std::cos(by);
-    return {f(sine * c - cosine * s, cosine * c + sine * s), f(sine * c + cosine * s, cosine * c - sine * s)};
+  SumOf<TwoLanes> operator()(double by) const {
+    const auto [s, c] = sine_and_cosine(by);
+    return f(TwoLanes{sine * c - cosine * s, sine * c + cosine * s},
+             TwoLanes{cosine * c + sine * s, cosine * c - sine * s});
   }
 };
 template <class F>
@@ -174,13 +200,18 @@ struct OfLength {
   F f;
   double middle = 0;
   void set(double at) { middle = at; }
-  std::array<Sum, 2> operator()(double by) const { return {f(middle - by), f(middle + by)}; }
+  SumOf<TwoLanes> operator()(double by) const { return f(TwoLanes{middle - by, middle + by}); }
 };
 template <class F>
 OfLength(F) -> OfLength<F>;
 
 /// Functions grow as exp(6 |Im χ|). From here on, that matters more than singularities.
 constexpr double kFarthestPole = 1.2;
+/// From these arguments on, inverse hyperbolic functions are more than `kFarthestPole`.
+constexpr double kSinhOfFarthest = 1.5095, kCoshOfFarthest = 1.8107;
+/// The inverse function or `kFarthestPole`, whichever is less.
+double near_asinh(double x) { return x < kSinhOfFarthest ? std::min(std::asinh(x), kFarthestPole) : kFarthestPole; }
+double near_acosh(double x) { return x < kCoshOfFarthest ? std::min(std::acosh(x), kFarthestPole) : kFarthestPole; }
 /// A range with a shorter ellipse to the nearest singularity is integrated in another form.
 constexpr double kLeastAxis = 1.4;
 /// If R² − ρ² is more than this, relative to R², differences of terms lose no more than a few digits.
@@ -222,10 +253,9 @@ class InBall {
   void turn(const OffsetSurface::Edge& edge) {
     BallCorner &from = work_.corners[edge.from], &to = work_.corners[edge.to];
     const Vec3 left = surface_.facets[edge.left].normal, right = surface_.facets[edge.right].normal;
-    if (Turns& turns = work_.facets[edge.left].turns; work_.facets[edge.left].slack > 0)
-      turns.pass(seen(from, work_.facets[edge.left]), seen(to, work_.facets[edge.left]));
-    if (Turns& turns = work_.facets[edge.right].turns; work_.facets[edge.right].slack > 0)
-      turns.pass(seen(to, work_.facets[edge.right]), seen(from, work_.facets[edge.right]));
+    for (const auto& [f, first, last] : {std::tuple{edge.left, &from, &to}, std::tuple{edge.right, &to, &from}})
+      if (BallFacet& facet = work_.facets[f]; facet.slack > 0)
+        facet.turns.pass(seen(*first, facet), seen(*last, facet));
     if (from.slack > 0) from.turns.pass(from.turns.seen(right), from.turns.seen(left));
     if (to.slack > 0) to.turns.pass(to.turns.seen(left), to.turns.seen(right));
   }
@@ -267,17 +297,18 @@ class InBall {
     // From `start` to `end`, or past ±π to `end`.
     const double end = edge.exact ? edge.right : std::remainder(start + own.angle, 2 * kPi);
     const bool past = end < start;
+    const BallAngle at_left(start), at_right(end);
     if (work_.facets[own.left].slack > 0)
-      if (!add_line(edge, work_.facets[own.left], start, 1, own.from, own.to)) return false;
+      if (!add_line(edge, work_.facets[own.left], at_left, 1, own.from, own.to)) return false;
     if (work_.facets[own.right].slack > 0)
-      if (!add_line(edge, work_.facets[own.right], end, -1, own.to, own.from)) return false;
+      if (!add_line(edge, work_.facets[own.right], at_right, -1, own.to, own.from)) return false;
 
     // sin ψ/2 = κ sin χ. If the sphere cuts all lines of the cylinder, κ = 1. Otherwise the chord is zero at χ = ±π/2,
     // and a smooth function of χ up to there.
     const double ratio = fourfold > 0 ? std::sqrt(chord2 / fourfold) : kInfinity, kappa = std::min(1.0, ratio);
-    const double to_end = ratio < 1 ? std::acosh(1 / ratio) : ratio < kInfinity ? std::acosh(ratio) : kInfinity;
+    const double to_end = near_acosh(std::max(ratio, 1 / ratio));
     // The centre lies on the surface at χ = ±i y.
-    const double to_surface = fourfold > 0 ? std::asinh(std::abs(gap) / (std::sqrt(fourfold) * kappa)) : kInfinity;
+    const double to_surface = fourfold > 0 ? near_asinh(std::abs(gap) / (std::sqrt(fourfold) * kappa)) : kFarthestPole;
     const auto of_psi = [&](double psi) {
       if (ratio >= 1) return psi / 2;
       const double h = std::sin(psi / 2) / kappa;
@@ -299,21 +330,21 @@ class InBall {
     };
     End ends[2]{{from, edge.from, edge.from2, -1, edge.from >= 0 ? 1.0 : -1.0, flats(from)},
                 {to, edge.to, edge.to2, 1, edge.to <= 0 ? 1.0 : -1.0, flats(to)}};
-    const double widest_sine = std::max(std::abs(std::sin(start / 2)), std::abs(std::sin(end / 2)));
+    const double widest_sine = std::max(std::abs(at_left.half_sine), std::abs(at_right.half_sine));
     if (!past && std::min(edge.from2, edge.to2) - fourfold * widest_sine * widest_sine > kDeepInBall * ball * ball) {
       // The whole band is deep in the ball. χ = ψ/2, and no chord is needed.
       const double low = start / 2, high = end / 2;
-      const double surface = fourfold > 0 ? std::asinh(std::abs(gap) / std::sqrt(fourfold)) : kFarthestPole;
-      double to_foot = std::min(surface, kFarthestPole), to_pole = kFarthestPole;
+      const double surface = fourfold > 0 ? near_asinh(std::abs(gap) / std::sqrt(fourfold)) : kFarthestPole;
+      double to_foot = surface, to_pole = kFarthestPole;
       for (End& one : ends) one.choose(d, 1, low, high, surface, kFarthestPole, to_foot, to_pole);
-      const auto f = [&](double sine, double cosine) {
-        const double squared = sine * sine, moved = fourfold * squared, q2 = gap * gap + moved;
-        const double rho0 = std::sqrt(q2 + ends[0].z * ends[0].z), rho1 = std::sqrt(q2 + ends[1].z * ends[1].z);
-        const double scale = 2 * (2 * d * squared - gap);
-        const double more = ball * ball * ball * (ends[1].z * rho0 - ends[0].z * rho1) / (q2 * rho0 * rho1);
-        Sum sum{scale * (own.length - more), std::abs(scale) * (own.length + std::abs(more))};
-        add_arc(ends[0], squared, cosine * cosine, rho0, ball - rho0, 2, d, sum);
-        add_arc(ends[1], squared, cosine * cosine, rho1, ball - rho1, 2, d, sum);
+      const auto f = [&](TwoLanes sine, TwoLanes cosine) {
+        const TwoLanes squared = sine * sine, moved = fourfold * squared, q2 = gap * gap + moved;
+        const TwoLanes rho0 = root(q2 + ends[0].z * ends[0].z), rho1 = root(q2 + ends[1].z * ends[1].z);
+        const TwoLanes scale = 2 * (2 * d * squared - gap);
+        const TwoLanes more = ball * ball * ball * (ends[1].z * rho0 - ends[0].z * rho1) / (q2 * rho0 * rho1);
+        SumOf<TwoLanes> sum{scale * (own.length - more), magnitude(scale) * (own.length + magnitude(more))};
+        add_arc(ends[0], squared, cosine * cosine, rho0, ball - rho0, TwoLanes{2, 2}, d, sum);
+        add_arc(ends[1], squared, cosine * cosine, rho1, ball - rho1, TwoLanes{2, 2}, d, sum);
         return sum;
       };
       Sum band;
@@ -322,7 +353,7 @@ class InBall {
       for (End& one : ends) {
         if (one.anchored && !one.whole)
           add_part(one.corner.turns, one.side, one.flats[0], one.flats[1], one.flats[0], one.flats[1]);
-        add_bounds(one, start, end, d, edge.off);
+        add_bounds(one, at_left, at_right, d, edge.off);
       }
       area_ += r * own.angle * own.length;
       return true;
@@ -335,24 +366,24 @@ class InBall {
       // Where the cylinder has no chord, the arc ends before the facet's normal.
       const auto has_chord = [&](double psi) { return ratio >= 1 || std::abs(std::sin(psi / 2)) < kappa; };
       const bool from_left = !again && has_chord(first), to_right = again == past && has_chord(last);
-      const auto slope = [&](double cosine, double other) {
-        return ratio < 1 ? 2 * kappa * cosine / std::sqrt(other) : 2.0;
+      const auto slope = [&](TwoLanes cosine, TwoLanes other) {
+        return ratio < 1 ? 2 * kappa * cosine / root(other) : TwoLanes{2, 2};
       };
-      const auto half_chord = [&](double cosine, double squared) {
-        return ratio < 1 ? std::sqrt(chord2) * cosine : std::sqrt(std::max(0.0, chord2 - fourfold * squared));
+      const auto half_chord = [&](TwoLanes cosine, TwoLanes squared) {
+        if (ratio < 1) return std::sqrt(chord2) * cosine;
+        const TwoLanes left_over = chord2 - fourfold * squared;
+        return root(TwoLanes{std::max(0.0, left_over[0]), std::max(0.0, left_over[1])});
       };
       if (astride) {
-        const auto f = [&](double sine, double cosine) {
-          const double squared = kappa * sine * kappa * sine;
-          const double other = cosine * cosine + (1 - kappa) * (1 + kappa) * sine * sine;
-          const double q2 = gap * gap + fourfold * squared, w = half_chord(cosine, squared);
-          const double term = slope(cosine, other) * 2 * w * w * w / q2 * (gap - 2 * d * squared);
-          return Sum{term, std::abs(term)};
+        const auto f = [&](TwoLanes sine, TwoLanes cosine) {
+          const TwoLanes squared = kappa * sine * kappa * sine;
+          const TwoLanes other = cosine * cosine + (1 - kappa) * (1 + kappa) * sine * sine;
+          const TwoLanes q2 = gap * gap + fourfold * squared, w = half_chord(cosine, squared);
+          const TwoLanes term = slope(cosine, other) * 2 * w * w * w / q2 * (gap - 2 * d * squared);
+          return SumOf<TwoLanes>{term, magnitude(term)};
         };
         Sum band;
-        if (!Integral({0, std::min(to_surface, kFarthestPole)}, {kPi / 2, std::min(to_end, kFarthestPole)})
-                 .add(low, high, OfAngle{f}, band))
-          return false;
+        if (!Integral({0, to_surface}, {kPi / 2, to_end}).add(low, high, OfAngle{f}, band)) return false;
         flux_.add(band, r / 3);
         const double chord = std::sqrt(chord2);
         area_ += r * (psi_of(high) - psi_of(low)) * (std::min(edge.to, chord) - std::max(edge.from, -chord));
@@ -361,18 +392,18 @@ class InBall {
         const double width = widest(one.square), begin = std::max(low, -width), stop = std::min(high, width);
         if (!(begin < stop)) continue;
         const double away = std::abs(one.z), z2 = away * away;
-        double to_foot = std::min(to_surface, kFarthestPole), to_pole = std::min(to_end, kFarthestPole);
+        double to_foot = to_surface, to_pole = to_end;
         one.choose(d, kappa, begin, stop, to_surface, to_end, to_foot, to_pole);
         // The border of the band adds to the band and to the sphere around the vertex.
-        const auto f = [&](double sine, double cosine) {
-          const double squared = kappa * sine * kappa * sine;
-          const double other = cosine * cosine + (1 - kappa) * (1 + kappa) * sine * sine;
-          const double rho = std::sqrt(gap * gap + fourfold * squared + z2), w = half_chord(cosine, squared);
-          const double s = (one.square - fourfold * squared) / (ball + rho);
-          const double t =
+        const auto f = [&](TwoLanes sine, TwoLanes cosine) {
+          const TwoLanes squared = kappa * sine * kappa * sine;
+          const TwoLanes other = cosine * cosine + (1 - kappa) * (1 + kappa) * sine * sine;
+          const TwoLanes rho = root(gap * gap + fourfold * squared + z2), w = half_chord(cosine, squared);
+          const TwoLanes s = (one.square - fourfold * squared) / (ball + rho);
+          const TwoLanes t =
               s * s * (ball + rho) * (w * (ball + rho) + ball * away) / ((w + away) * rho * (w * rho + ball * away));
-          const double scale = slope(cosine, other), of_band = scale * one.sign * t * (gap - 2 * d * squared);
-          Sum sum{of_band, std::abs(of_band)};
+          const TwoLanes scale = slope(cosine, other), of_band = scale * one.sign * t * (gap - 2 * d * squared);
+          SumOf<TwoLanes> sum{of_band, magnitude(of_band)};
           add_arc(one, squared, other, rho, s, scale, d, sum);
           return sum;
         };
@@ -385,7 +416,7 @@ class InBall {
           add_part(one.corner.turns, one.side, begin > low || !from_left ? seen(begin_psi) : one.flats[0],
                    stop < high || !to_right ? seen(stop_psi) : one.flats[1], one.flats[0], one.flats[1]);
         }
-        add_bounds(one, begin_psi, stop_psi, d, edge.off);
+        add_bounds(one, BallAngle(begin_psi), BallAngle(stop_psi), d, edge.off);
         if (!astride && one.sign > 0) area_ += r * (stop_psi - begin_psi) * (std::sqrt(chord2) - away);
       }
     }
@@ -409,8 +440,8 @@ class InBall {
       if (!with_arc) return;
       // The arc has poles where the direction is towards the centre, and opposite to it.
       const double length = corner.distance;
-      const double foot = std::asinh(std::abs(z) / (kappa * std::sqrt(2 * d * (length + d))));
-      to_pole = std::min({to_pole, to_end, std::acosh(std::sqrt((1 + length / d) / 2))});
+      const double foot = near_asinh(std::abs(z) / (kappa * std::sqrt(2 * d * (length + d))));
+      to_pole = std::min({to_pole, to_end, near_acosh(std::sqrt((1 + length / d) / 2))});
       const double nearest = std::min({to_foot, to_surface, foot});
       anchored = whole || !(Integral({0, nearest}, {kPi / 2, to_pole}).axis(low, high) > kLeastAxis);
       if (!anchored) to_foot = nearest;
@@ -419,16 +450,16 @@ class InBall {
 
   /// Adds what the arc at an end has of the flux through the sphere around the vertex, in units of r / 3, where
   /// `squared` is sin² ψ/2, and `other` is cos² ψ/2.
-  void add_arc(const End& end, double squared, double other, double rho, double s, double scale, double d,
-               Sum& sum) const {
+  void add_arc(const End& end, TwoLanes squared, TwoLanes other, TwoLanes rho, TwoLanes s, TwoLanes scale, double d,
+               SumOf<TwoLanes>& sum) const {
     const BallCorner& corner = end.corner;
     if (end.anchored) {
-      const double factor =
+      const TwoLanes factor =
           -end.side * end.z * scale /
           (rho * corner.near * (rho + corner.near) * (end.z * end.z / (corner.distance + d) + 2 * d * other));
       sum.add(fall(corner, s, rho), factor);
     } else if (end.with_arc) {
-      const double factor = end.side * end.z * scale / (2 * r_ * rho * (end.z * end.z + 4 * d * d * squared * other));
+      const TwoLanes factor = end.side * end.z * scale / (2 * r_ * rho * (end.z * end.z + 4 * d * d * squared * other));
       sum.add(cap(corner, s, rho), factor);
     }
   }
@@ -436,58 +467,64 @@ class InBall {
   /// The flux through the cap of the sphere around a vertex, from R − ρ = s up to the ball's surface. For a radian, it
   /// is this over 6 ρ and the distance of the vertex. With the power p of the centre, distance² − r², the integral is
   /// that of (ρ − R³/ρ²) (ρ² − p). Far from the vertex, p − R² is exact; near its sphere, p is.
-  Sum cap(const BallCorner& corner, double s, double rho) const {
+  template <class T>
+  SumOf<T> cap(const BallCorner& corner, T s, T rho) const {
     const double ball = ball_;
     const bool close = corner.near < ball / 2;
-    const double first =
-        close ? rho * (ball * (s - 1.5 * ball) - s * s / 4) : ball * ball * s + rho * s * (ball - s / 4);
-    const double second = (close ? corner.power : corner.excess) / 2 * (3 * ball - s);
-    return {s * s * (first + second), s * s * (std::abs(first) + std::abs(second))};
+    const T first = close ? rho * (ball * (s - 1.5 * ball) - s * s / 4) : ball * ball * s + rho * s * (ball - s / 4);
+    const T second = (close ? corner.power : corner.excess) / 2 * (3 * ball - s);
+    return {s * s * (first + second), s * s * (magnitude(first) + magnitude(second))};
   }
 
   /// How this flux falls from the nearest point of the sphere around the vertex to a point with R − ρ = s. For a
   /// radian, it is this times the difference of s, over 6 ρ ρ' and the distance of the vertex.
-  Sum fall(const BallCorner& corner, double s, double rho) const {
-    const double s0 = corner.slack, ball = ball_, near = corner.near, both = rho * near, sum = rho + near;
+  template <class T>
+  SumOf<T> fall(const BallCorner& corner, T s, T rho) const {
+    const double s0 = corner.slack, ball = ball_, near = corner.near;
+    const T both = rho * near, sum = rho + near;
     if (near < ball / 2) {
-      const double cube = ball * ball * ball, first = both * (sum * (rho * rho + near * near) / 4 - cube);
-      const double second = corner.power * (cube - both * sum / 2);
-      return {first + second, both * cube + std::abs(second)};
+      const double cube = ball * ball * ball;
+      const T first = both * (sum * (rho * rho + near * near) / 4 - cube);
+      const T second = corner.power * (cube - both * sum / 2);
+      return {first + second, both * cube + magnitude(second)};
     }
-    const double y = s0 * s0 + s0 * s + s * s, x = s0 + s, xy = s0 * s;
-    const double first = ball * ball * (ball * y - xy * x) + ball * y * both;
-    const double second = x * (s0 * s0 + s * s) / 4 * both;
-    const double third = corner.excess / 2 * (3 * ball * (ball * x - xy) - ball * y + xy * x);
-    return {first - second + third, std::abs(first) + std::abs(second) + std::abs(third)};
+    const T y = s0 * s0 + s0 * s + s * s, x = s0 + s, xy = s0 * s;
+    const T first = ball * ball * (ball * y - xy * x) + ball * y * both;
+    const T second = x * (s0 * s0 + s * s) / 4 * both;
+    const T third = corner.excess / 2 * (3 * ball * (ball * x - xy) - ball * y + xy * x);
+    return {first - second + third, magnitude(first) + magnitude(second) + magnitude(third)};
   }
 
-  void add_bounds(const End& end, double begin, double stop, double d, double off) {
-    const double least = begin < 0 && stop > 0 ? 0 : std::sin(std::min(std::abs(begin), std::abs(stop)) / 2);
+  void add_bounds(const End& end, const BallAngle& begin, const BallAngle& stop, double d, double off) {
+    const bool across_zero = begin.psi < 0 && stop.psi > 0;
+    const double least = across_zero ? 0 : std::min(std::abs(begin.half_sine), std::abs(stop.half_sine));
     const double nearest2 = (d - r_) * (d - r_) + 4 * d * r_ * least * least + end.z * end.z;
-    tilted_ += off * r_ * r_ * (stop - begin) * most_at(std::sqrt(nearest2));
+    tilted_ += off * r_ * r_ * (stop.psi - begin.psi) * most_at(std::sqrt(nearest2));
     BallCorner& corner = end.corner;
     corner.turns.most = std::max(corner.turns.most, ball_ * ball_ - nearest2);
     if (!end.with_arc) return;
     // The angle of an arc loses more, the nearer it passes to the direction to the centre.
-    const double across = begin < 0 && stop > 0 ? 0 : std::min(std::abs(std::sin(begin)), std::abs(std::sin(stop)));
+    const double across = across_zero ? 0 : std::min(std::abs(begin.sine), std::abs(stop.sine));
     const double passed = std::sqrt(end.z * end.z + d * d * across * across);
     tilted_ += off * cap(corner, corner.slack, corner.near).size / (6 * corner.near * passed);
   }
 
   /// Adds a side of a moved facet, where it is a band's border at ψ. From first to last, the facet is on the left.
-  bool add_line(const BallEdge& edge, BallFacet& facet, double psi, double side, int first, int last) {
-    const double half_sine = std::sin(psi / 2), d = edge.distance, gap = gap_of(edge);
+  bool add_line(const BallEdge& edge, BallFacet& facet, const BallAngle& at_psi, double side, int first, int last) {
+    const double half_sine = at_psi.half_sine, d = edge.distance, gap = gap_of(edge);
     const double moved = 4 * d * r_ * half_sine * half_sine, ball = ball_;
     const double chord2 = edge.depth * (ball + gap) - moved;
     if (!(chord2 > 0)) return true;
     const double chord = std::sqrt(chord2);
     const double low = std::max(edge.from, -chord), high = std::min(edge.to, chord);
     if (!(low < high)) return true;
-    const double q2 = gap * gap + moved, inner = side * d * std::sin(psi);  // from the side to the foot
+    const double q2 = gap * gap + moved, inner = side * d * at_psi.sine;  // from the side to the foot
     const double s0 = facet.slack, near = facet.near, inner2 = inner * inner;
     const double nearest2 = low < 0 && high > 0 ? 0 : std::min(low * low, high * high);
-    tilted_ += edge.off * (edge.exact ? d * std::abs(std::sin(psi)) + r_ : d + r_) * (high - low) *
-               most_at(std::sqrt(q2 + nearest2));
+    // The field is at most R³ / 3ρ². On a whole line at a distance q, the integral of that is π R³ / 3q.
+    tilted_ +=
+        edge.off * (edge.exact ? d * std::abs(at_psi.sine) + r_ : d + r_) *
+        std::min((high - low) * most_at(std::sqrt(q2 + nearest2)), kPi * ball * ball * ball / (3 * std::sqrt(q2)));
     facet.turns.most = std::max(facet.turns.most, chord2 - nearest2);
     if (inner < 0)
       facet.turns.segment = std::min(facet.turns.segment, 2 * chord2 * chord / (-inner + std::sqrt(inner2 + chord2)));
@@ -500,10 +537,10 @@ class InBall {
     // Along the side, the field is singular at ±i √q2, and the angle seen from the foot at ±i `inner`.
     const Integral past_foot({0, std::abs(inner)}, {0, std::abs(inner)});
     if (past_foot.axis(low, high) > kLeastAxis) {
-      const auto f = [&](double t) {
-        const double t2 = t * t, rho = std::sqrt(q2 + t2), s = (chord2 - t2) / (ball + rho);
-        const double term = -near * inner * s * s * (3 * ball - s) / (2 * rho * (inner2 + t2));
-        return Sum{term, std::abs(term)};
+      const auto f = [&](TwoLanes t) {
+        const TwoLanes t2 = t * t, rho = root(q2 + t2), s = (chord2 - t2) / (ball + rho);
+        const TwoLanes term = -near * inner * s * s * (3 * ball - s) / (2 * rho * (inner2 + t2));
+        return SumOf<TwoLanes>{term, magnitude(term)};
       };
       return past_foot.add(low, high, OfLength{f}, sums) && done();
     }
@@ -518,12 +555,12 @@ class InBall {
              flat_first, flat_last);
     const Integral integral({0, std::sqrt(q2)}, {0, std::sqrt(q2)});
     if (integral.axis(low, high) > kLeastAxis) {
-      const auto f = [&](double t) {
-        const double rho = std::sqrt(q2 + t * t), s = (chord2 - t * t) / (ball + rho);
-        const double y = s0 * s0 + s0 * s + s * s, x = s0 + s, xy = s0 * s;
-        const double term =
+      const auto f = [&](TwoLanes t) {
+        const TwoLanes rho = root(q2 + t * t), s = (chord2 - t * t) / (ball + rho);
+        const TwoLanes y = s0 * s0 + s0 * s + s * s, x = s0 + s, xy = s0 * s;
+        const TwoLanes term =
             inner * (3 * ball * ball * x - 3 * ball * xy - ball * y + xy * x) / (2 * rho * (rho + near));
-        return Sum{term, std::abs(term)};
+        return SumOf<TwoLanes>{term, magnitude(term)};
       };
       return integral.add(low, high, OfLength{f}, sums) && done();
     }
@@ -599,12 +636,12 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
   const Vec3 centre = rounded(exactly);
 
   const Scratch<BallWork> work;
-  work->corners.assign(hull.vertices.size(), {}), work->facets.assign(hull.planes.size(), {}), work->edges.clear(),
-      work->planes.clear();
+  work->corners.resize(hull.vertices.size()), work->facets.resize(hull.planes.size());
+  work->edges.clear(), work->planes.clear();
   double nearest = kInfinity, farthest = 0;  // distances of the core
   for (size_t v = 0; v < hull.vertices.size(); ++v) {
     BallCorner& corner = work->corners[v];
-    corner.apart = hull.vertices[v] - centre, corner.distance = std::sqrt(norm2(corner.apart));
+    corner.exact = false, corner.apart = hull.vertices[v] - centre, corner.distance = std::sqrt(norm2(corner.apart));
     nearest = std::min(nearest, corner.distance), farthest = std::max(farthest, corner.distance);
   }
   const double whole_ball = 4.0 / 3.0 * kPi * radius * radius * radius;
@@ -617,6 +654,7 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
   int highest_facet = 0;
   for (int f = 0; f < static_cast<int>(work->facets.size()); ++f) {
     BallFacet& facet = work->facets[f];
+    facet.plane = -1, facet.foot = {}, facet.reached = false;
     facet.height = -dot(surface.facets[f].normal, work->corners[hull.facet(f)[0]].apart);
     if (facet.height > highest) highest = facet.height, highest_facet = f;
   }
@@ -633,19 +671,22 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
     edge.distance = std::sqrt(line2);
     edge.to_centre = edge.distance > 0 ? across / edge.distance : any_orthogonal(own.along);
     if (beside == 0) nearest = std::min(nearest, edge.distance);
+    work->facets[own.left].reached = work->facets[own.right].reached = true;
     work->edges.push_back(edge);
   }
-  if (highest > 0) {
-    // If the foot is on the facet, the plane is nearest.
-    const Vec3 n = surface.facets[highest_facet].normal;
-    const auto ring = hull.facet(highest_facet);
-    bool foot = true;
-    for (size_t i = 0; foot && i < ring.size(); ++i) {
-      const Vec3 a = work->corners[ring[i]].apart, b = work->corners[ring[(i + 1) % ring.size()]].apart;
-      foot = dot(n, cross(a, b)) > 0;
+  const auto foot_on = [&](int f) {
+    const Vec3 n = surface.facets[f].normal;
+    const auto ring = hull.facet(f);
+    Vec3 a = work->corners[ring.back()].apart;
+    for (const int corner : ring) {
+      const Vec3 b = work->corners[corner].apart;
+      if (!(dot(n, cross(a, b)) > 0)) return false;
+      a = b;
     }
-    if (foot) nearest = std::min(nearest, highest);
-  }
+    return true;
+  };
+  // If the foot is on the facet, the plane is nearest.
+  if (highest > 0 && foot_on(highest_facet)) nearest = std::min(nearest, highest);
   if (highest > 0 && std::abs(nearest - r) <= doubtful) return std::nullopt;
   const bool inside = highest <= 0 || nearest < r;
   const double depth = inside ? radius : sum - nearest;
@@ -657,6 +698,9 @@ std::optional<VolumeAlone> volume_in_ball(const Placed& rounded_hull, const Plac
   for (int f = 0; f < static_cast<int>(work->facets.size()); ++f) {
     BallFacet& facet = work->facets[f];
     facet.slack = radius - std::abs(facet.height - r);
+    // If no edge of a facet reaches the ball, the facet does so only around the foot of the centre. No edge is near the
+    // foot then, and doubles are enough to decide whether it is on the facet.
+    if (facet.slack >= -doubtful && !facet.reached && !foot_on(f)) facet.slack = -kInfinity;
     if (wide_too && facet.slack >= -doubtful) {
       facet.plane = static_cast<int>(work->planes.size());
       work->planes.push_back(exact_plane(hull, f));
