@@ -27,6 +27,8 @@ constexpr double kShareOfPlaces = 0.25;
 constexpr double kTiltOfPlanes = 2 * kUnit;
 /// rad: rounding of the angle between a normal and the direction of the apex.
 constexpr double kTurn = 8 * kUnit;
+/// Rounding of the equation of a place where two borders cross, relative to the sum of its terms.
+constexpr double kOfRoots = 2 * kUnit;
 constexpr int kNone = -1;
 
 /// A plane of the polytope, about the apex. Its area in the rounded hull is an integral along its border.
@@ -34,7 +36,8 @@ struct Face {
   Vec3 normal;
   double offset = 0;
   double twice_area = 0;
-  Vec3 open;  ///< m: the sum of all steps along the border, zero if it is closed
+  Vec3 open;         ///< m: the sum of all steps along the border, zero if it is closed
+  double loose = 0;  ///< m: sum of the uncertainties of its places
 };
 
 /// What of an edge of the polytope is in the rounded hull.
@@ -60,13 +63,15 @@ struct Sight {
 /// An angle φ, with sin φ and 1 - cos φ.
 struct Turn {
   double angle = 0, sine = 0, versine = 0;
+  double doubt = 0;  ///< rad: its error, large where two borders nearly touch
 
   Turn() = default;
   explicit Turn(double at) : angle(at) {
     const double half = std::sin(at / 2);
     sine = 2 * half * std::cos(at / 2), versine = 2 * half * half;
   }
-  Turn(double at, double sine_of, double versine_of) : angle(at), sine(sine_of), versine(versine_of) {}
+  Turn(double at, double sine_of, double versine_of, double doubt_of = 0)
+      : angle(at), sine(sine_of), versine(versine_of), doubt(doubt_of) {}
 };
 
 /// The band along an edge. The normal at the angle φ from the pole to `side` belongs to the line through the point
@@ -200,9 +205,9 @@ class InPolytope {
   double error() const {
     const double extent = std::sqrt(extent2_);
     double open = 0;
-    for (const Face& face : work_.faces) open += norm(face.open) * std::abs(face.offset);
+    for (const Face& face : work_.faces) open += (norm(face.open) + face.loose) * std::abs(face.offset);
     return (off_ + kTiltOfPlanes * extent) * area_ + kTurn * r_ * tilted_ + kRoundingOfTerms * size_ + open * extent +
-           norm(unbalanced_) * farthest_;
+           loose_ + norm(unbalanced_) * farthest_;
   }
 
  private:
@@ -440,13 +445,14 @@ class InPolytope {
   void add_roots(double height, double across, double back, double middle, double half) {
     const double square = across * across - height * (height - 2 * back);
     if (!(square > 0)) return;
-    const double sum = -(across + std::copysign(std::sqrt(square), across));
+    const double slope = std::sqrt(square), sum = -(across + std::copysign(slope, across));
+    const double doubt = kOfRoots * (std::abs(height) + std::abs(across) + std::abs(back)) / slope;
     for (const double tangent : {sum / (height - 2 * back), height / sum}) {
       const double root = 2 * std::atan(tangent), share = 2 / (1 + tangent * tangent);
       for (const double turn : {-2 * kPi, 0.0, 2 * kPi})
         if (std::abs(root + turn - middle) < half)
           work_.breaks.emplace_back(root + turn, tangent * share,
-                                    std::isfinite(tangent) ? tangent * tangent * share : 2);
+                                    std::isfinite(tangent) ? tangent * tangent * share : 2, doubt);
     }
   }
   void begin_breaks(double middle, double half) { work_.breaks.assign({Turn(middle - half), Turn(middle + half)}); }
@@ -541,7 +547,7 @@ class InPolytope {
     for (size_t i = 0; i + 1 < work_.breaks.size(); ++i) {
       const Turn &begin = work_.breaks[i], &end = work_.breaks[i + 1];
       if (!(begin.angle < end.angle)) continue;
-      const auto [between, sine, versine] = Turn((begin.angle + end.angle) / 2);
+      const auto [between, sine, versine, none] = Turn((begin.angle + end.angle) / 2);
       double low = band.first, high = band.last;
       const BandCut *lowest = nullptr, *highest = nullptr;
       for (const BandCut& cut : all) {
@@ -666,6 +672,7 @@ class InPolytope {
       const Vec3 step = r_ * ((end.sine - begin.sine) * band.side - (end.versine - begin.versine) * band.pole) +
                         (along(end) - along(begin)) * edge.along;
       add_border(side.cut->plane, side.sign * step, side.sign * side.twice, side.size);
+      work_.faces[side.cut->plane].loose += 2 * r_ / std::abs(side.cut->slope) * (begin.doubt + end.doubt);
     }
   }
 
@@ -728,6 +735,7 @@ class InPolytope {
     // The integrals have no value at the direction opposite to the pole.
     if (below(-2 * pole, kNone, kNone) && among_normals(-2 * pole)) return false;
     double cones = 0, size = 0, angle = 0;
+    double loose = 0;  // rad: uncertainty of the solid angle, as ends of arcs may not meet
     Vec3 twice_normals, open;
     double most_lost = 0;
     // Adds an arc. Over it, dot(pole, u × du) is even + odd (1 - cos φ), and 1 - dot(pole, u) is q + more (1 - cos φ).
@@ -749,6 +757,10 @@ class InPolytope {
         with(weight, u, step);
       });
       open += sign * (circle.at(end) - circle.at(begin));
+      for (const Turn& at : {begin, end}) {
+        const double lost = q + more * at.versine;
+        loose += circle.radius * at.doubt * std::sqrt(lost / std::max(2 - lost, kUnit));
+      }
     };
     // Great circles between the normals of facets.
     for (const int e : edges) {
@@ -823,6 +835,7 @@ class InPolytope {
                   border_size += weight * r_ * std::sqrt(norm2(point) * norm2(step));
                 });
         add_border(j, r_ * (circle.at(end) - circle.at(begin)), twice, border_size);
+        work_.faces[j].loose += r_ * radius * (begin.doubt + end.doubt);
       }
     }
     // Near the direction opposite to the pole, the rule loses digits.
@@ -830,7 +843,9 @@ class InPolytope {
     if (most_lost > kTooFar || !(norm(open) <= 64 * kTurn)) return false;
     area_ += square * std::abs(angle), sizes_ += square * std::abs(angle);
     unbalanced_ += square / 2 * twice_normals;
-    add_cone(square * cones, square * size, std::abs(seen.base) + std::abs(seen.slope) * most_lost);
+    const double reach = std::abs(seen.base) + std::abs(seen.slope) * most_lost;
+    add_cone(square * cones, square * size, reach);
+    loose_ += square / 3 * loose * reach;
     return true;
   }
 
@@ -935,6 +950,7 @@ class InPolytope {
   double farthest_;    ///< m: largest distance of a tangent plane, or of a plane of the polytope, from the apex
   double seams_ = 0;   ///< m: sum of these lengths
   double border_ = 0;  ///< m: sum of the sizes of all steps along borders of faces
+  double loose_ = 0;   ///< m³: what patches may lack or have too much, as their arcs may not meet
   double extent2_;     ///< m²: largest square of a distance from the apex
   Vec3 unbalanced_;    ///< m²
 };
