@@ -14,7 +14,6 @@
 #include "geometry/scratch.h"
 #include "geometry/wide_pose.h"
 #include "methods/round/offset/below_plane.h"
-#include "methods/round/quadric/gauss.h"
 
 namespace overlapper::offset {
 namespace {
@@ -616,6 +615,7 @@ class InPolytope {
       const double first = r_ + std::abs(ends.across), second = r_ + std::abs(ends.ahead);
       add_border(cut->plane, sign * step, sign * dot(work_.faces[cut->plane].normal, spanned),
                  whole * (std::sqrt(norm2(start)) * (first + second) + first * second));
+      work_.faces[cut->plane].loose += 2 * r_ / std::abs(cut->slope) * (begin.doubt + end.doubt);
     };
     add_end(highest, high, 1), add_end(lowest, low, -1);
     return true;
