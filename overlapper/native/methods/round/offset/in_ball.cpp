@@ -521,10 +521,8 @@ class InBall {
     const double q2 = gap * gap + moved, inner = side * d * at_psi.sine;  // from the side to the foot
     const double s0 = facet.slack, near = facet.near, inner2 = inner * inner;
     const double nearest2 = low < 0 && high > 0 ? 0 : std::min(low * low, high * high);
-    // The field is at most R³ / 3ρ². On a whole line at a distance q, the integral of that is π R³ / 3q.
-    tilted_ +=
-        edge.off * (edge.exact ? d * std::abs(at_psi.sine) + r_ : d + r_) *
-        std::min((high - low) * most_at(std::sqrt(q2 + nearest2)), kPi * ball * ball * ball / (3 * std::sqrt(q2)));
+    tilted_ += edge.off * (edge.exact ? d * std::abs(at_psi.sine) + r_ : d + r_) * (high - low) *
+               most_at(std::sqrt(q2 + nearest2));
     facet.turns.most = std::max(facet.turns.most, chord2 - nearest2);
     if (inner < 0)
       facet.turns.segment = std::min(facet.turns.segment, 2 * chord2 * chord / (-inner + std::sqrt(inner2 + chord2)));
