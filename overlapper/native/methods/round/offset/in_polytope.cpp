@@ -687,6 +687,14 @@ class InPolytope {
     Vec3 between(const Turn& a, const Turn& b) const { return at(Turn((a.angle + b.angle) / 2)); }
   };
 
+  /// Makes `x`, which is orthogonal to an axis but for rounding, a unit vector. Returns its length; 0 if that is only
+  /// rounding, with no direction.
+  static double direct(Vec3& x, Vec3 axis) {
+    const double length = std::sqrt(norm2(x));
+    x = length > kTurn ? x / length : any_orthogonal(axis);
+    return length > kTurn ? length : 0;
+  }
+
   bool add_vertex(int v) {
     const std::span<const int> edges = core_.edges_at(v);
     const auto out_of = [&](int e) { return core_.edges[e].from == v ? core_.edges[e].along : -core_.edges[e].along; };
@@ -769,8 +777,7 @@ class InPolytope {
       const double sine = sine_of(e);
       Vec3 x = pole - sine * out;
       x -= dot(x, out) * out;
-      const double aside = std::sqrt(norm2(x)), cosine = aside < 0.5 ? aside : std::sqrt((1 - sine) * (1 + sine));
-      x = aside > 0 ? x / aside : any_orthogonal(out);
+      const double aside = direct(x, out), cosine = aside < 0.5 ? aside : std::sqrt((1 - sine) * (1 + sine));
       const double lost = sine * sine / (1 + cosine);
       const Circle circle{lost * x - sine * out, x, cross(edge.along, x), 1};
       const double half = edge.angle / 2;
@@ -798,8 +805,7 @@ class InPolytope {
       const double radius = std::sqrt(under * over);
       Vec3 x = ahead > 0 ? pole - n : pole + n;
       x -= dot(x, n) * n;
-      const double aside = std::sqrt(norm2(x));
-      x = aside > 0 ? x / aside : any_orthogonal(n);
+      const double aside = direct(x, n);
       const double wider = -above * (level + ahead) / (radius + aside);
       const Circle circle{above * n + wider * x, x, cross(n, x), radius};
       begin_breaks(0, kPi);
