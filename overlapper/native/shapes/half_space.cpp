@@ -34,7 +34,13 @@ double HalfSpace::volume() const { return kInfinity; }
 Bounds HalfSpace::bounds(const Pose& pose) const {
   const Plane placed = pose * plane;
   const Vec3 touch = placed.offset * placed.normal;
-  const auto limit = [&](int i, double side) { return side * placed.normal[i] == 1 ? touch[i] : side * kInfinity; };
+  // A tilt counts: nothing bounds how far the half-space goes along it. Up to rounding, a turn makes none.
+  const auto along = [&](int i) {
+    return std::abs(placed.normal[(i + 1) % 3]) <= kUnit && std::abs(placed.normal[(i + 2) % 3]) <= kUnit;
+  };
+  const auto limit = [&](int i, double side) {
+    return side * placed.normal[i] == 1 && along(i) ? touch[i] : side * kInfinity;
+  };
   return {{limit(0, -1), limit(1, -1), limit(2, -1)}, {limit(0, 1), limit(1, 1), limit(2, 1)}};
 }
 

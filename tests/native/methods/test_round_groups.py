@@ -226,3 +226,14 @@ def test_stated_errors_hold_where_a_plane_cuts_a_thin_lens_aslant(kinds, seed):
         halves = [overlap(contact.a, contact.b, HalfSpace(side * normal, side * offset)) for side in (1, -1)]
         stated = sum(each.volume_error for each in (whole, *halves))
         assert abs(sum(half.volume for half in halves) - whole.volume) <= stated
+
+
+@pytest.mark.parametrize("normal", [[1, 0, 1e-9], [1, 1.6e-9, 7e-9], [1, 0, -1e-8]])
+def test_a_half_space_nearly_along_an_axis_cuts_aslant(normal):
+    """The first component of its unit normal is 1, but its tilt shifts the far end of a large body by a micrometre."""
+    cube = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    body, cut = Placed(RoundedHull(cube, 271)), Placed(HalfSpace(normal, 0), (235.2, -133.5, -23.8))
+    pair = overlap(body, cut)
+    for around in (Placed(Box([1e4, 1e4, 1e4])), HalfSpace([0.36, 0.48, 0.8], 4000)):
+        group = overlap(body, cut, around)
+        assert abs(group.volume - pair.volume) <= group.volume_error + pair.volume_error
