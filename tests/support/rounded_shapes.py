@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpmath import mp, mpf
 
-from overlapper import Overlap, Placed, RoundedHull
+from overlapper import Box, Overlap, Placed, RoundedHull, overlap
 
 CUBE_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 HALF = np.array([0.5, 0.25, 0.125])
@@ -28,6 +28,19 @@ def points(rng, count):
 
 def rounded_box(r, at=(0, 0, 0), turn=UNTURNED, half=HALF):
     return Placed(RoundedHull(CUBE_CORNERS * half, r), at, turn)
+
+
+def sliced(a: Placed, b: Placed) -> Overlap:
+    """By slices: three bodies have no other way."""
+    found = overlap(a, b, Placed(Box([60, 60, 60]), a.position))
+    assert found.way == "slicing"
+    return found
+
+
+def agree(a: Placed, b: Placed) -> bool:
+    """Whether the pair and its slices differ by no more than both errors."""
+    found, by_slices = overlap(a, b), sliced(a, b)
+    return abs(found.volume - by_slices.volume) <= found.volume_error + by_slices.volume_error
 
 
 def within(found: Overlap, expected, beside=2e-15):

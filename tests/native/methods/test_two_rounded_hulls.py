@@ -7,9 +7,9 @@ body around both, and certificates.
 import numpy as np
 import pytest
 from mpmath import mp, mpf
-from rounded_shapes import CUBE_CORNERS, HALF, cap, lens, points, rounded_box, within
+from rounded_shapes import CUBE_CORNERS, HALF, agree, cap, lens, points, rounded_box, within
 
-from overlapper import Box, Capsule, Placed, RoundedHull, overlap
+from overlapper import Capsule, Cylinder, Placed, RoundedHull, overlap
 
 OCTAHEDRON = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], float)
@@ -46,19 +46,6 @@ def crossing_cylinders(a, b, apart, sine):
         return 4 * mp.sqrt(abs(a**2 - z**2)) * mp.sqrt(abs(b**2 - (apart - z) ** 2)) / sine
 
     return mp.quad(area, [apart - b, (apart - b + a) / 2, a])
-
-
-def sliced(a, b):
-    """By slices: three bodies have no other way."""
-    around = Placed(Box([60, 60, 60]), a.position)
-    found = overlap(a, b, around)
-    assert found.way == "slicing"
-    return found
-
-
-def agree(a, b):
-    found, by_slices = overlap(a, b), sliced(a, b)
-    return abs(found.volume - by_slices.volume) <= found.volume_error + by_slices.volume_error
 
 
 @pytest.mark.parametrize("depth", DEPTHS)
@@ -221,12 +208,27 @@ def test_features_with_tiny_angles_keep_their_digits(way, depth):
         assert agree(a, b)
 
 
+@pytest.mark.parametrize("shape", [Capsule(0.25, 0.5), Cylinder(0.25, 0.5)])
 @pytest.mark.parametrize("seed", range(3))
-def test_certificates_agree(seed):
+def test_certificates_agree(seed, shape):
     rng = np.random.default_rng([seed, 3])
     a = Placed(RoundedHull(points(rng, 5), 0.0625), (0.45, 0.05, 0.1), rng.normal(size=4))
-    b = Placed(Capsule(0.25, 0.5), (0, 0, 0), rng.normal(size=4))
+    b = Placed(shape, (0, 0, 0), rng.normal(size=4))
     found = overlap(a, b)
     assert found.way == "closed form"
     lower, upper = found.certificate().verify()
     assert float(lower) - found.volume_error <= found.volume <= float(upper) + found.volume_error
+
+
+@pytest.mark.parametrize("shape", [Capsule(0.00634, 0.58), Cylinder(0.00634, 0.58)])
+@pytest.mark.parametrize("beside", [0, 1e-16, 1e-14, 1e-12, 1e-11, 1e-10, 1e-8, 1e-6])
+def test_an_axis_beside_a_corner_has_a_direction_that_is_orthogonal_to_it(shape, beside):
+    """The direction from the axis to the corner is a short difference of long vectors."""
+    cube, outwards = RoundedHull(CUBE_CORNERS * 0.5, 0.0638), -np.array([0.447, 0.775, 0.447])
+    axis = outwards / np.linalg.norm(outwards)
+    across = np.cross(axis, [0, 0, 1]) / np.linalg.norm(np.cross(axis, [0, 0, 1]))
+    at = cube.core.vertices.min(axis=0) + cube.radius * axis + beside * across
+    rod = Placed(shape, at, (-axis[1], axis[0], 0, 1 + axis[2]))  # turns the z axis to the corner's normal
+    found = overlap(Placed(cube), rod)
+    assert found.way == "closed form"
+    assert agree(Placed(cube), rod)

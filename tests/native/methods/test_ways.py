@@ -121,7 +121,7 @@ WITH_A_ROUNDED_HULL = {
     "hull": (Hull([[-1, -1, -1], [1, -1, -1], [0, 1, -1], [0, 0, 1]]), "closed form"),
     "ball": (Sphere(0.5), "closed form"),
     "capsule": (Capsule(0.3, 1.0), "closed form"),
-    "cylinder": (Cylinder(0.3, 1.0), "slicing"),
+    "cylinder": (Cylinder(0.3, 1.0), "closed form"),
     "ellipsoid": (Ellipsoid([0.3, 0.4, 0.5]), "closed form"),
     "rounded hull": (RoundedHull([[-1, -1, -1], [1, -1, -1], [0, 1, -1], [0, 0, 1]], 0.1), "closed form"),
 }

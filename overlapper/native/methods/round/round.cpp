@@ -65,10 +65,9 @@ std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b, c
   if (!smooth(other.shape)) return offset::volume_in_polytope(rounded, other, nearest, depth);
   if (rounded_hull(other.shape)) return offset::volume_of_two_rounded(rounded, other, between);
   const auto revolved = revolution(other.shape);
-  // Two surfaces also measure a cylinder, but the stated error does not cover all nearly parallel features.
-  if (!revolved || !revolved->round_ends) return std::nullopt;
-  return revolved->half_length == 0 ? offset::volume_in_ball(rounded, other)
-                                    : offset::volume_of_two_rounded(rounded, other, between);
+  if (!revolved) return std::nullopt;
+  return revolved->round_ends && revolved->half_length == 0 ? offset::volume_in_ball(rounded, other)
+                                                            : offset::volume_of_two_rounded(rounded, other, between);
 }
 
 std::optional<pieces::RoundMeasures> measure_by_slices(const pieces::SlicedPair& pair) {

@@ -84,8 +84,8 @@ inline constexpr std::array<RoundChoice, 13> kRoundChoices{{
 std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference);
 
 /// The volume of an overlapping pair by the surface of a rounded hull, if one body is a rounded hull and the other one
-/// a half-space, a box, a hull, a ball, an ellipsoid, a capsule or a rounded hull. `between` is a point inside both
-/// bodies, if one is known.
+/// a half-space, a box, a hull, a ball, an ellipsoid, a capsule, a cylinder or a rounded hull. `between` is a point
+/// inside both bodies, if one is known.
 std::optional<VolumeAlone> volume_by_surface(const Placed& a, const Placed& b, const std::optional<Vec3>& between,
                                              const std::optional<Vec3>& nearest, double depth);
 

@@ -715,7 +715,8 @@ class TwoRounded {
     const double reach = std::sqrt(quartic.p);
     if (foot + reach < band.begin - tie_ || foot - reach > band.end + tie_) return true;
     quartic.start = band.foot + foot * band.along, quartic.e = band.along, quartic.r = r;
-    quartic.x = distance > tie_ ? across / distance : any_orthogonal(band.along);
+    // A short difference is not quite orthogonal to the axis.
+    quartic.x = distance > tie_ ? unit(across - dot(across, band.along) * band.along) : any_orthogonal(band.along);
     quartic.y = overlapper::cross(band.along, quartic.x);
     quartic.p1 = 4 * distance * r;
     if (wide_) sharpen_band_and_patch(quartic, body, features_[body] - side.first_band(), v);
