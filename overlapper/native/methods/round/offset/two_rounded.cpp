@@ -146,6 +146,8 @@ WidePlane wide_plane(const Side& side, int f) {
   const WideVector normal = unit(wide_normal(corners[a], corners[b], corners[c]));
   return {normal, dot(normal, wide(corners[a]) - side.inner) + DoubleDouble{side.r}};
 }
+/// The direction of a difference that is orthogonal to an axis but for rounding, which counts if it is short.
+Vec3 across_axis(Vec3 across, Vec3 axis) { return unit(across - dot(across, axis) * axis); }
 /// A direction across an axis, where a circle begins and ends. Other features of aligned bodies hardly cross it there.
 Vec3 beside(Vec3 axis) {
   const Vec3 x = any_orthogonal(axis);
@@ -715,8 +717,7 @@ class TwoRounded {
     const double reach = std::sqrt(quartic.p);
     if (foot + reach < band.begin - tie_ || foot - reach > band.end + tie_) return true;
     quartic.start = band.foot + foot * band.along, quartic.e = band.along, quartic.r = r;
-    // A short difference is not quite orthogonal to the axis.
-    quartic.x = distance > tie_ ? unit(across - dot(across, band.along) * band.along) : any_orthogonal(band.along);
+    quartic.x = distance > tie_ ? across_axis(across, band.along) : any_orthogonal(band.along);
     quartic.y = overlapper::cross(band.along, quartic.x);
     quartic.p1 = 4 * distance * r;
     if (wide_) sharpen_band_and_patch(quartic, body, features_[body] - side.first_band(), v);
@@ -743,7 +744,7 @@ class TwoRounded {
       const double depth = r + ball - distance, below = depth * (ball + distance - r) / (2 * distance);
       if (wide_ || sine > kOfPlaces || !(depth > tie_) || !(distance - (ball - r) > tie_)) return false;
       const double level = r - below, width = std::sqrt(below * (r + level));
-      return add_two_lines(band, across / distance, level, width, r * ball / (distance * width));
+      return add_two_lines(band, across_axis(across, band.along), level, width, r * ball / (distance * width));
     }
     common = common / sine;
     const double foot = dot(overlapper::cross(apart, far.along), common) / sine;
