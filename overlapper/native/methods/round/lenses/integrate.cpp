@@ -141,8 +141,8 @@ class Integrating {
                            : part.border.error() / kBorderError;
   }
 
-  /// Whether the finest rule may be accurate enough: terms of the border have to fall as fast as before for 8 more
-  /// nodes, and then to the last term that the rule integrates.
+  /// Whether the finest rule may be accurate enough. Terms of the border then have to fall as fast as before, for 8
+  /// more nodes and up to the last term that the rule integrates.
   bool suits_finer(const Part& part) const {
     return part.volume.ratio() < 1e-3 &&
            !(wanted_.closing && border_error(part) * std::pow(part.border.ratio(), 4.0 / 3) > border_);

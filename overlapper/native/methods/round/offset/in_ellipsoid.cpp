@@ -82,7 +82,7 @@ struct Pole {
     return std::sqrt(apart2) * height;
   }
   /// The most that the integral changes if its border moves off the sphere, for the length and the distance. It is
-  /// ∮ φ a·(w × dw) − x·(w × dw) / 2 for w = u − a, and φ(w²) has the numerator `slack` + length w² / 4 or 1. A
+  /// ∮ φ a·(w × dw) − x·(w × dw) / 2 for w = u − a. There φ(w²) has the numerator `slack` + length w² / 4, or 1. A
   /// displacement δ along u adds ∮ 2 φ a·m + 2 φ' w² (a·m + w·m / 2) − x·m for m = δ u × dw. |a·m| and |w·m| are at
   /// most δ |w| |dw|.
   double spread(Vec3 apart) const {

@@ -39,7 +39,7 @@ struct Face {
   double loose = 0;  ///< m: sum of the uncertainties of its places
 };
 
-/// What of an edge of the polytope is in the rounded hull.
+/// The part of an edge of the polytope in the rounded hull.
 struct Ridge {
   Vec3 from, to;
   bool enters = false, leaves = false;
@@ -53,7 +53,7 @@ constexpr int kMostFaces = 64;
 
 /// The sphere about a vertex, or the cylinder about an edge, as seen from the apex. `pole` is a unit normal. Near the
 /// apex it leads from the core to the apex, as the normals there do. The normal u = pole + v belongs to the point
-/// base · pole + r v, and its tangent plane is base + slope q away from the apex, where q = |v|² / 2.
+/// base · pole + r v. The tangent plane there is base + slope |v|² / 2 away from the apex.
 struct Sight {
   Vec3 pole;
   double base = 0, slope = 0;  ///< m
@@ -73,9 +73,9 @@ struct Turn {
       : angle(at), sine(sine_of), versine(versine_of), doubt(doubt_of) {}
 };
 
-/// The band along an edge. The normal at the angle φ from the pole to `side` belongs to the line through the point
-/// `start` + r (sin φ side - (1 - cos φ) pole), whose points are t along the edge. Its tangent plane is
-/// base + tilt sin φ + slope (1 - cos φ) away from the apex.
+/// The band along an edge. Angles φ are from the pole to `side`. The normal at φ belongs to a line along the edge
+/// through the point `start` + r (sin φ side - (1 - cos φ) pole). Its points are t from there. The tangent plane along
+/// it is base + tilt sin φ + slope (1 - cos φ) away from the apex.
 struct SeenBand : Sight {
   Vec3 start;                   ///< m
   double tilt = 0;              ///< m

@@ -13,8 +13,8 @@ namespace overlapper::offset {
 ///
 /// If only one plane cuts a rounded hull, this is the volume below that plane. Otherwise it is a sum of cones from an
 /// apex, over all parts of both surfaces that lie in the other body (Gauss). Each part is bounded by arcs and segments.
-/// Every arc is cut by all planes that reach it. What is left is a smooth integral along the arc, by the rule of Gauss
-/// and Legendre. Area vectors of the whole surface have to add up to zero.
+/// Every arc is cut by all planes that reach it. The rest is a smooth integral along the arc, by the rule of Gauss and
+/// Legendre. Area vectors of the whole surface have to add up to zero.
 ///
 /// In a shallow contact, `near` is the apex. The distances of all tangent planes and faces from it come from
 /// double-doubles, and directions are differences from the direction of the apex. So no term is much larger than the

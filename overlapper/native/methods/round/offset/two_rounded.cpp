@@ -23,8 +23,8 @@ namespace {
 
 /// Rounding of a term, relative to its size. No term takes more than 60 operations that each may round.
 constexpr double kOfTermsOfTwo = 64 * kUnit;
-/// Rounding of a point of a crossing, relative to its distances from the origin and from centres. Of an exact curve:
-/// relative to the terms of the point.
+/// Rounding of a point of a crossing, relative to its distances from the origin and from centres. On an exact curve, it
+/// is relative to the terms of the point.
 constexpr double kOfPlaces = 8 * kUnit;
 /// Directions that differ less have no certain cross product.
 constexpr double kAlike = 1e-7;
@@ -244,8 +244,8 @@ struct Curve {
   double loss = 1;  ///< error of a point, relative to that of a place
   /// With a point for s = 0 or ψ = 0 in place of `start`, from double-doubles.
   bool exact = false;
-  /// Of an exact conic: sizes of the terms of the distance from the other surface, for 1, 1 − cos s and sin s. Of an
-  /// exact quartic: 1 / (2 R) for the other radius R.
+  /// An exact conic has the sizes of the terms of the distance from the other surface, for 1, 1 − cos s and sin s. An
+  /// exact quartic has 1 / (2 R) in `constant`, for the other radius R.
   double constant = 0, round = 0, tilt = 0;
 
   /// Sizes of the terms of a point, and of its distance from the other surface.
@@ -793,7 +793,8 @@ class TwoRounded {
     return {along, begin - dot(begin, along) * along};
   }
 
-  /// Of a facet and a band. The conic begins at the direction from the band's axis to the origin. Returns its angle.
+  /// The ellipse of a facet and a band. It begins at the direction from the band's axis to the origin. Returns its
+  /// angle.
   double sharpen_ellipse(Curve& conic, int body, int e) const {
     const auto [across, offset] = wide_facet(body, features_[body]);
     const auto [along, foot] = wide_axis(1 - body, e);
@@ -812,7 +813,8 @@ class TwoRounded {
     return std::atan2(dot(w, band.across), dot(w, band.middle));
   }
 
-  /// Of a plane and a sphere that reaches `depth` below it. `more` is 1 / r of another sphere in place of the plane.
+  /// The circle of a plane and a sphere that reaches `depth` below it. `more` is 1 / r of another sphere in place of
+  /// the plane.
   void sharpen_circle(Curve& conic, const WideVector& across, DoubleDouble offset, const WideVector& centre, double r,
                       DoubleDouble depth, double more) const {
     const WideVector beside = centre - dot(across, centre) * across;

@@ -134,7 +134,7 @@ double error_of(const slicing::Sum& sum) {
 
 /// Adds a piece by slices about its centroid, if less is missing or uncertain then. The inner point may be at one end
 /// of a long piece, near a surface that is far from the rest. Slices then suit that end, and the rest has fewer digits.
-/// Or a piece moves so fast across the slices that most digits of a place only tell where its slice is.
+/// A piece may also move so fast across the slices that most digits of a place only tell where its slice is.
 bool add_about_centroid(const PieceContext& at, const Stack& stack, const BestSum& sum, Sums& sums) {
   const Integrals& s = sum.best.integrals;
   const double most = kMostOpen * (at.share_of(sums.totals.volume) + s.volume);
