@@ -75,6 +75,8 @@ std::optional<Overlaps> ask(Batch& batch, const Question& q) try {
   Overlaps answer =
       batch.overlaps(q.positions, q.orientations, pairs, q.separated, q.tolerance, q.method, q.threads, finished);
   require(finished, "nobody cancelled");
+  // Columns of deferred rows are empty until these are asked for.
+  answer.depth = answer.depths(), answer.normal = answer.normals();
   return answer;
 } catch (const std::invalid_argument&) {
   return {};
